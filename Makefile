@@ -1,0 +1,79 @@
+# One checkout, one command: `make reproduce`. It needs make and Python 3.11 or newer with pip, nothing else.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := help
+
+# The first interpreter that is new enough; choose another with `make PYTHON=/path/to/python test`.
+CANDIDATES := python3.11 python3.12 python3.13 python3
+PYTHON ?= $(shell for python in $(CANDIDATES); do \
+	if $$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then echo $$python; break; fi; done)
+VENV := .venv
+PY := $(VENV)/bin/python
+READY := $(VENV)/.installed
+# The tests run in this many processes; each keeps to one thread.
+JOBS ?= 2
+STUDY := results/output_observer
+PIP_TOOLS := 7.6.2
+
+# Small matrices are slower with many threads, and sums in another order would change the last digits.
+export OPENBLAS_NUM_THREADS := 1
+export OMP_NUM_THREADS := 1
+export MKL_NUM_THREADS := 1
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+.PHONY: help reproduce reproduce-all test test-all lint bench docs lock clean
+
+help: ## this list
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-14s %s\n", $$1, $$2}'
+
+reproduce: $(READY) ## the paper's main study and its figures, in results/ (resumes if interrupted)
+	$(PY) -m studies run output_observer --preset paper --out $(STUDY)
+	$(PY) -m paper_figures --from $(STUDY) --out $(STUDY)/figures
+
+reproduce-all: reproduce bench ## the above and the benchmarks
+
+test: $(READY) ## the tests of a few minutes
+	$(PY) -m pytest -n $(JOBS) -m "not slow"
+
+test-all: $(READY) ## every test, also the long ones
+	$(PY) -m pytest -n $(JOBS) -m "slow or not slow"
+
+lint: $(READY) ## style, format and types
+	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
+	$(PY) -m mypy
+
+bench: $(READY) ## timings as ratios within one run, in results/benchmarks
+	$(PY) -m benchmarks --out results/benchmarks
+
+docs: $(READY) ## redraw the diagrams, refresh the quoted results in README.md and docs, check the links
+	$(PY) docs/build.py
+
+lock: ## resolve requirements.lock anew from pyproject.toml (UPGRADE=1 takes newer versions)
+	$(call need_python)
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11) and "make lock needs Python 3.11, the oldest supported")'
+	$(PYTHON) -m venv build/lock
+	build/lock/bin/python -m pip install --quiet pip-tools==$(PIP_TOOLS)
+	CUSTOM_COMPILE_COMMAND="make lock" build/lock/bin/pip-compile --quiet --no-config \
+		--extra dev --strip-extras --allow-unsafe --generate-hashes \
+		--no-emit-index-url --no-emit-find-links --no-emit-trusted-host \
+		$(if $(UPGRADE),--upgrade) --output-file requirements.lock pyproject.toml
+
+clean: ## remove the environment, caches and built files; results/ stays
+	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis ./*.egg-info
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+define need_python
+@test -n "$(PYTHON)" || { echo "No Python 3.11 or newer among: $(CANDIDATES)." \
+	"Install one, or name it: make PYTHON=/path/to/python3.11 ..." >&2; exit 1; }
+endef
+
+# setuptools is in the lock, so that the package is built without fetching anything else.
+$(READY): requirements.lock pyproject.toml
+	$(call need_python)
+	$(PYTHON) -m venv $(VENV)
+	$(PY) -m pip install --quiet --require-hashes -r requirements.lock
+	$(PY) -m pip install --quiet --no-deps --no-build-isolation --editable .
+	touch $@

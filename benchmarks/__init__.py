@@ -1,0 +1,1 @@
+"""Timings of the numerics as ratios within one run: ``python -m benchmarks``."""

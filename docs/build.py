@@ -1,0 +1,166 @@
+"""Refresh what README.md and the pages in docs/ quote from results, and check their links.
+
+Between ``<!-- begin: NAME -->`` and ``<!-- end: NAME -->`` stands what NAME says:
+
+* ``results/.../report.md``: the file; ``results/.../report.md#Title``: one section of it, without its title;
+* ``figure results/.../name.png: text``: the figure, copied to docs/images, with `text` for those who cannot see it
+  (the text is left out of the end marker);
+* ``output PAGE.md 1``: what the page's first Python block prints.
+
+Where a file is missing (results are not part of a checkout), the quoted text stays and a line says so.
+
+Usage: ``python docs/build.py [--check] [--no-run]``. With ``--check`` nothing is written, and the exit status is 1 if a
+page differs or a link is broken. With ``--no-run`` no Python block is run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+IMAGES = Path("docs/images")
+BLOCK = re.compile(r"<!-- begin: (?P<name>[^\n]+?) -->\n(?P<body>.*?)<!-- end: (?P<end>[^\n]+?) -->", re.DOTALL)
+FENCE = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```[^\n]*$", re.DOTALL | re.MULTILINE)
+LINK = re.compile(r"\[[^\]\n]*\]\((?P<target>[^)\s]+)\)")
+
+
+class Missing(Exception):
+    """A quoted file is not there; the message names it."""
+
+
+def pages() -> list[Path]:
+    """README.md and the pages in docs/."""
+    return [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def section(text: str, title: str) -> str:
+    """The text below the heading `title`, up to the next heading of its level or a higher one."""
+    heading = re.search(rf"^(#+) {re.escape(title)}[ \t]*$", text, re.MULTILINE)
+    if heading is None:
+        raise Missing(f"no heading {title!r}")
+    rest = text[heading.end() :]
+    following = re.search(rf"^#{{1,{len(heading[1])}}} ", rest, re.MULTILINE)
+    return rest[: following.start() if following else None].strip() + "\n"
+
+
+def source(name: str) -> Path:
+    """A file below the root."""
+    path = ROOT / name
+    if not path.is_file():
+        raise Missing(f"{name} is not there: run `make reproduce`")
+    return path
+
+
+def figure(name: str, text: str, page: Path, *, write: bool) -> str:
+    """The Markdown of a figure, after its copy to docs/images."""
+    original = source(name).read_bytes()
+    copy = ROOT / IMAGES / Path(name).name
+    if write:
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        copy.write_bytes(original)
+    elif not copy.is_file() or copy.read_bytes() != original:
+        return "(another figure)\n"
+    return f"![{text}]({Path(os.path.relpath(copy, page.parent)).as_posix()})\n"
+
+
+def output(page_name: str, number: int) -> str:
+    """What a Python block of a page prints, as a text block."""
+    blocks = [code for language, code in FENCE.findall(source(page_name).read_text("utf-8")) if language == "python"]
+    if not 1 <= number <= len(blocks):
+        raise SystemExit(f"docs/build.py: {page_name} has {len(blocks)} Python blocks, block {number} is quoted")
+    run = subprocess.run(
+        [sys.executable, "-c", blocks[number - 1]], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    if run.returncode != 0:
+        raise SystemExit(f"docs/build.py: block {number} of {page_name} fails:\n{run.stderr}")
+    return f"```text\n{run.stdout.rstrip()}\n```\n"
+
+
+def content(name: str, page: Path, *, write: bool) -> str:
+    """What stands between the markers of `name`."""
+    kind, _, rest = name.partition(" ")
+    if kind == "figure":
+        path, _, text = rest.partition(": ")
+        return figure(path, text, page, write=write)
+    if kind == "output":
+        page_name, number = rest.rsplit(" ", 1)
+        return output(page_name, int(number))
+    path, _, title = name.partition("#")
+    text = source(path).read_text("utf-8")
+    return section(text, title) if title else text.strip() + "\n"
+
+
+def refreshed(page: Path, *, write: bool, run: bool, notes: list[str]) -> str:
+    """The text of `page` with its quoted blocks as they should be."""
+
+    def replace(match: re.Match[str]) -> str:
+        name, end = match["name"], match["end"]
+        if name.split(": ")[0] != end:
+            raise SystemExit(f"docs/build.py: {page.name}: 'begin: {name}' is closed by 'end: {end}'")
+        if name.startswith("output ") and not run:
+            return match[0]
+        try:
+            body = content(name, page, write=write)
+        except Missing as missing:
+            notes.append(f"{page.name}: left as it is, {missing}")
+            return match[0]
+        return f"<!-- begin: {name} -->\n{body}<!-- end: {end} -->"
+
+    return BLOCK.sub(replace, page.read_text("utf-8"))
+
+
+def anchors(text: str) -> set[str]:
+    """The anchors that a page's headings get."""
+    titles = re.findall(r"^#+ (.+)$", FENCE.sub("", text), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.strip().lower()).replace(" ", "-") for title in titles}
+
+
+def broken_links(page: Path, text: str) -> Iterator[str]:
+    """Links of a page to files or headings that do not exist; other sites are not visited."""
+    for match in LINK.finditer(FENCE.sub("", text)):
+        target = match["target"]
+        if re.match(r"https?://|mailto:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        file = page.parent / path if path else page
+        if not file.exists():
+            yield f"{page.name}: no file {target}"
+        elif anchor and anchor not in anchors(text if file == page else file.read_text("utf-8")):
+            yield f"{page.name}: no heading for {target}"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Refresh or check all pages."""
+    parser = argparse.ArgumentParser(prog="python docs/build.py", description="Refresh quoted results, check links.")
+    parser.add_argument("--check", action="store_true", help="write nothing; exit status 1 if something differs")
+    parser.add_argument("--no-run", action="store_true", help="run no Python block")
+    arguments = parser.parse_args(argv)
+    if not arguments.check:
+        subprocess.run(
+            [sys.executable, "-m", "paper_figures.block_diagram", "--out", str(IMAGES)], cwd=ROOT, check=True
+        )
+    notes: list[str] = []
+    faults: list[str] = []
+    for page in pages():
+        text = refreshed(page, write=not arguments.check, run=not arguments.no_run, notes=notes)
+        if text != page.read_text("utf-8"):
+            if arguments.check:
+                faults.append(f"{page.name}: quotes other results than those in results/: run `make docs`")
+            else:
+                page.write_text(text, "utf-8")
+                print(f"{page.name}: refreshed")
+        faults += broken_links(page, text)
+    for line in notes + faults:
+        print(line)
+    print(f"{len(pages())} pages, {len(faults)} faults")
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,157 @@
+"""From a decoupled plant and a specification to loops: over the whole box, or frozen at positions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from lpvhinf.checks import Array
+from lpvhinf.codesign.specification import Specification
+from lpvhinf.controllers import RigidBodyStructure, initial_gain, observer_model
+from lpvhinf.decoupling import DecoupledPlant
+from lpvhinf.fitting import interpolate
+from lpvhinf.hinfstruct import BlockDiagonal, ControllerStructure, DiagonalGain, StaticGain
+from lpvhinf.polynomial import ChebyshevMatrix
+from lpvhinf.problems import Loop, ObserverBranch, TunedParts, four_block, six_block
+from lpvhinf.shaping import Scaling, ShapingFilters, pade_delay, scaling
+from lpvhinf.statespace.generalized import GeneralizedPlant
+from lpvhinf.statespace.interconnect import series
+from lpvhinf.statespace.lpv import LPVStateSpace
+from lpvhinf.statespace.lpv_generalized import LPVGeneralizedPlant
+
+ARCHITECTURES = ("rigid-body", "output-observer")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Assembly:
+    """Everything of a co-design that does not depend on the tuned parameters.
+
+    The observer's C_o(p) and D_o(p) are what a controller would implement: polynomials. The plant beside
+    it is the polynomial one in `loop`, and the plant model itself in `frozen_loops`.
+    """
+
+    plant: DecoupledPlant
+    specification: Specification
+    architecture: str
+
+    @cached_property
+    def scaling(self) -> Scaling:
+        """Scalings of the plant's channels and states."""
+        n_rb = self.plant.n_rb
+        return scaling(self.plant, self.specification.bandwidths(n_rb), self.specification.errors(n_rb))
+
+    @cached_property
+    def omega_flex(self) -> Array:
+        """Frequencies of the controlled modes (n_flex,) [rad/s]."""
+        n_rb = self.plant.n_rb
+        return np.asarray(self.plant.omega[n_rb : n_rb + self.plant.n_flex])
+
+    @cached_property
+    def filters(self) -> ShapingFilters:
+        """The shaping filters."""
+        return self.specification.filters(self.omega_flex, self.plant.n_rb)
+
+    @cached_property
+    def observer(self) -> ObserverBranch | None:
+        """The observer's scheduled model, or None for the conventional design."""
+        if self.architecture == "rigid-body":
+            return None
+        n_kept = self.plant.n_rb + self.plant.n_flex
+        correction = interpolate(self.plant.static_correction, box=self.plant.box, degree=self.plant.degree).matrix
+        size = float(np.max(np.abs(correction.coefficients)))
+        scaled = self.scaling.apply(self.plant.system)
+        model = observer_model(scaled, n_kept, self.scaling.correction(correction.trimmed(1e-13 * size)))
+        rigid = np.repeat(2 * np.pi * self.scaling.f_bw, 2)
+        return ObserverBranch(
+            model=model,
+            omega=self.omega_flex,
+            Q=self.specification.Q,
+            # a mode's correction is scaled by the bandwidth too: its Riccati gain is far below omega_i
+            injection=np.concatenate([rigid, np.full(2 * self.plant.n_flex, float(np.max(rigid)))]),
+        )
+
+    @cached_property
+    def loop(self) -> Loop:
+        """The loop with the polynomial plant, over the whole box."""
+        return self._loop(self.plant.system, self.observer)
+
+    def frozen_loops(self, points: Array) -> list[Loop]:
+        """The loops with the plant model itself at positions (N, n_p)."""
+        systems = self.plant.frozen(points)
+        if self.observer is None:
+            return [self._loop(system, None) for system in systems]
+        C, D = self.observer.model.C.sample(points), self.observer.model.D.sample(points)
+        box, model = self.plant.box, self.observer.model
+        loops = []
+        for system, c, d in zip(systems, C, D, strict=True):
+            frozen = LPVStateSpace(model.A, model.B, ChebyshevMatrix(c, box), ChebyshevMatrix(d, box))
+            branch = ObserverBranch(
+                model=frozen, omega=self.observer.omega, Q=self.observer.Q, injection=self.observer.injection
+            )
+            loops.append(self._loop(system, branch))
+        return loops
+
+    def _loop(self, system: LPVStateSpace, observer: ObserverBranch | None) -> Loop:
+        plant = self.scaling.apply(system)
+        if self.specification.delay > 0.0:
+            delay = pade_delay(self.specification.delay, self.specification.delay_order, self.plant.n_rb)
+            plant = series(plant, LPVStateSpace.from_system(delay, plant.box))
+        return Loop(plant=plant, filters=self.filters, n_rb=self.plant.n_rb, observer=observer)
+
+    def problem(self, loop: Loop) -> LPVGeneralizedPlant:
+        """The synthesis problem of this architecture around a loop."""
+        return four_block(loop) if self.architecture == "rigid-body" else six_block(loop)
+
+    def generalized_plants(self, points: Array) -> list[GeneralizedPlant]:
+        """The synthesis problem with the plant model itself, frozen at positions (N, n_p)."""
+        centre = np.mean(self.plant.box, axis=1)
+        return [self.problem(loop).at(centre) for loop in self.frozen_loops(points)]
+
+    @cached_property
+    def rigid_body(self) -> RigidBodyStructure:
+        """The structure of K_RB."""
+        w = 2 * np.pi * self.scaling.f_bw
+        return RigidBodyStructure(self.filters.f_I, w**2)
+
+    @cached_property
+    def structure(self) -> ControllerStructure:
+        """The tuned part diag(K_RB, L, -xi) as a structure for `hinfstruct`."""
+        if self.observer is None:
+            return self.rigid_body
+        n_rb, n_flex = self.plant.n_rb, self.plant.n_flex
+        return BlockDiagonal(
+            self.rigid_body, StaticGain(self.observer.model.n_x, n_rb), DiagonalGain(n_flex)
+        )
+
+    def split(self, theta: Array) -> tuple[Array, Array, Array]:
+        """Parameters of K_RB, L (n_o, n_rb) and xi (n_flex,) in theta."""
+        n = self.rigid_body.n_parameters
+        if self.observer is None:
+            return theta, np.zeros((0, self.plant.n_rb)), np.zeros(0)
+        n_o, n_rb = self.observer.model.n_x, self.plant.n_rb
+        # the structure tunes u_FM = k v, k = -xi of either sign
+        return theta[:n], theta[n : n + n_o * n_rb].reshape(n_o, n_rb), -theta[n + n_o * n_rb :]
+
+    def tuned_parts(self, theta: Array) -> TunedParts:
+        """The tuned part at theta."""
+        rigid, L, xi = self.split(theta)
+        K_RB = self.rigid_body.realize(rigid)
+        return TunedParts(K_RB=K_RB) if self.observer is None else TunedParts(K_RB=K_RB, L=L, xi=xi)
+
+    def start(self, points: Array, rigid: Array | None = None, xi: float = 0.1) -> Array:
+        """A first theta: K_RB by rule of thumb or as given, L from the Riccati equation, small xi."""
+        if rigid is None:
+            rigid = self.rigid_body.parameters(self.rigid_body.rule_of_thumb(self.scaling.f_bw))
+        if self.observer is None:
+            return np.asarray(rigid)
+        L, _ = initial_gain(
+            self.observer.model,
+            points,
+            n_rb=self.plant.n_rb,
+            omega_bw=2 * np.pi * self.scaling.f_bw,
+            omega_flex=self.omega_flex,
+        )
+        gain = L / self.observer.injection[:, None]
+        return np.concatenate([rigid, gain.ravel(), np.full(self.plant.n_flex, -xi)])

@@ -1,0 +1,133 @@
+"""What is wanted of a design: everything that is fixed before tuning."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lpvhinf.checks import Array, finite_array, known_options, positive
+from lpvhinf.decoupling import DecoupledPlant
+from lpvhinf.errors import DomainError, LpvHinfWarning
+from lpvhinf.shaping import ShapingFilters
+
+Number = float | Sequence[float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Specification:
+    r"""Bandwidths, shaping filters, scaling, band-pass and delay of a co-design.
+
+    A value that is given once serves every axis, or every controlled mode.
+
+    Parameters
+    ----------
+    f_bw : [Hz]
+        Target bandwidths of the rigid axes.
+    expected_error : [m, rad], optional
+        Expected tracking errors, :math:`W_z^{sc} = \mathrm{diag}(1/e_i)`; default 1 um and 10 urad for six
+        axes (x, y, z, rx, ry, rz), else 1e-6.
+    integral_ratio, roll_off_ratio : float
+        f_I and f_r over f_bw; the paper takes 1/4 and 4.
+    alpha, K_s, K_r : float
+        Of W_z1 and W_z2; the paper takes 20, 0.5, 0.5.
+    epsilon, beta_1, beta_2 : float
+        Of W_w3; the paper gives no values. Larger epsilon asks for more damping.
+    Q : float
+        Of the band-pass in K_FM.
+    delay : [s]
+        Loop delay, as a Padé filter of order `delay_order` at the plant's outputs; 0 for none, as in the paper.
+
+    Raises
+    ------
+    DomainError
+        If a value is not finite and above zero (delay: not below zero), or an option is unknown.
+
+    Examples
+    --------
+    >>> Specification(f_bw=40.0).filters(np.array([2 * np.pi * 139.4]), n_rb=6).f_I.tolist()
+    [10.0, 10.0, 10.0, 10.0, 10.0, 10.0]
+    """
+
+    f_bw: Number = 40.0
+    expected_error: Number | None = None
+    integral_ratio: float = 0.25
+    roll_off_ratio: float = 4.0
+    alpha: float = 20.0
+    K_s: float = 0.5
+    K_r: float = 0.5
+    epsilon: Number = 0.03
+    beta_1: float = 0.5
+    beta_2: float = 0.05
+    Q: float = 1.0
+    delay: float = 0.0
+    delay_order: int = 2
+
+    def __post_init__(self) -> None:
+        for name in ("integral_ratio", "roll_off_ratio", "alpha", "K_s", "K_r", "beta_1", "beta_2", "Q"):
+            positive(name, getattr(self, name))
+        for name in ("f_bw", "epsilon", "expected_error"):
+            value = getattr(self, name)
+            if value is not None and np.any(finite_array(name, value) <= 0.0):
+                raise DomainError(f"{name} is {value}, wanted values above 0.")
+        if not (np.isfinite(self.delay) and self.delay >= 0.0):
+            raise DomainError(f"delay is {self.delay}, wanted a finite number of seconds, 0 or more.")
+        if self.beta_1 <= self.beta_2:
+            raise DomainError(f"beta_1 = {self.beta_1}, beta_2 = {self.beta_2}; wanted beta_1 > beta_2.")
+
+    @classmethod
+    def from_mapping(cls, settings: dict[str, Any]) -> Specification:
+        """From settings as read from a file; an unknown one is an error that lists the known ones."""
+        known_options("Specification", settings, (field.name for field in dataclasses.fields(cls)))
+        return cls(**{key: tuple(value) if isinstance(value, list) else value for key, value in settings.items()})
+
+    def bandwidths(self, n_rb: int) -> Array:
+        """f_bw of every axis, (n_rb,) [Hz]."""
+        return _each("f_bw", self.f_bw, n_rb)
+
+    def errors(self, n_rb: int) -> Array:
+        """Expected errors of every axis, (n_rb,) [m, rad]."""
+        if self.expected_error is None:
+            return np.array([1e-6] * 3 + [1e-5] * 3) if n_rb == 6 else np.full(n_rb, 1e-6)
+        return _each("expected_error", self.expected_error, n_rb)
+
+    def filters(self, omega_flex: Array, n_rb: int) -> ShapingFilters:
+        """The shaping filters for controlled modes at omega_flex [rad/s]."""
+        f_bw = self.bandwidths(n_rb)
+        return ShapingFilters(
+            f_I=self.integral_ratio * f_bw,
+            f_r=self.roll_off_ratio * f_bw,
+            alpha=self.alpha,
+            K_s=self.K_s,
+            K_r=self.K_r,
+            epsilon=_each("epsilon", self.epsilon, len(omega_flex)),
+            beta_1=self.beta_1,
+            beta_2=self.beta_2,
+            omega_flex=omega_flex,
+        )
+
+    def warn_if_demanding(self, plant: DecoupledPlant) -> None:
+        """Warn if a bandwidth is above the first discarded mode, which nobody then controls."""
+        discarded = plant.omega[plant.discarded] / (2 * np.pi)
+        highest = float(np.max(self.bandwidths(plant.n_rb)))
+        if len(discarded) and highest >= np.min(discarded):
+            warnings.warn(
+                f"f_bw = {highest:.1f} Hz is above the first discarded mode at {np.min(discarded):.1f} Hz, which lies "
+                "in the control band then: expect gamma well above 1, or no stabilising controller at all. "
+                "Raise n_flex or lower f_bw.",
+                LpvHinfWarning,
+                stacklevel=3,
+            )
+
+
+def _each(name: str, value: Number, n: int) -> Array:
+    array = finite_array(name, value)
+    if array.ndim == 0 or array.shape == (1,):
+        return np.full(n, float(array.ravel()[0]))
+    if array.shape != (n,):
+        raise DomainError(f"{name} has {array.size} values, wanted 1 or {n}.")
+    return array

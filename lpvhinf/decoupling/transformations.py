@@ -1,0 +1,102 @@
+"""The decoupling matrices T_y and T_u of eq. 6, and T_u extended to flexible modes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lpvhinf.checks import Array
+from lpvhinf.errors import AssumptionError
+
+MAX_CONDITION = 1e10
+
+
+def output_decoupling(output_gains: Array) -> Array:
+    r"""T_y: rigid-body coordinates from the sensors, :math:`T_y = C_{RB}(p)^\dagger` (eq. 6).
+
+    Parameters
+    ----------
+    output_gains : (N, n_y, n_rb)
+        Sensor readings per unit of every rigid-body mode, at N positions.
+
+    Returns
+    -------
+    (N, n_rb, n_y)
+
+    Raises
+    ------
+    AssumptionError
+        If the sensors do not see every rigid-body mode.
+
+    Examples
+    --------
+    >>> output_decoupling(np.array([[[2.0], [2.0]]])).tolist()
+    [[[0.25, 0.25]]]
+    """
+    n_y, n_rb = output_gains.shape[1:]
+    if n_y < n_rb:
+        raise AssumptionError(
+            f"{n_y} sensors cannot tell {n_rb} rigid-body modes apart. Add sensors, or keep fewer modes."
+        )
+    worst = _worst_condition(output_gains)
+    if worst > MAX_CONDITION:
+        raise AssumptionError(
+            f"the sensors do not observe every rigid-body mode: condition number {worst:.2g}, wanted below "
+            f"{MAX_CONDITION:.0g}. Move or add a sensor."
+        )
+    return np.asarray(np.linalg.pinv(output_gains))
+
+
+def input_decoupling(input_gains: Array, weights: Array | None = None) -> Array:
+    r"""T_u: actuator commands that drive one mode each, :math:`T_u = W B^\top (B W B^\top)^{-1}`.
+
+    With W = I this is the pseudo-inverse of eq. 6; with the rows of flexible modes in B it is the
+    extended modal input decoupling (eq. 7). The weights say how much each actuator takes part; weights
+    that are smooth in p keep :math:`\Phi_a(p) T_u(p)` smooth, where switching actuators on and off would not.
+
+    Parameters
+    ----------
+    input_gains : (N, n_controlled, n_u)
+        Modal forces per unit of every actuator, at N positions.
+    weights : (N, n_u), optional
+        At least zero; zero takes an actuator out.
+
+    Returns
+    -------
+    (N, n_u, n_controlled)
+
+    Raises
+    ------
+    AssumptionError
+        If there are too few actuators, or they cannot drive the modes independently.
+
+    Examples
+    --------
+    >>> input_decoupling(np.array([[[1.0, 1.0]]])).tolist()
+    [[[0.5], [0.5]]]
+    """
+    n_controlled, n_u = input_gains.shape[1:]
+    active = n_u if weights is None else int(np.min(np.sum(weights > 0.0, axis=1)))
+    if active < n_controlled:
+        raise AssumptionError(
+            f"{active} active actuators cannot drive {n_controlled} modes independently. "
+            f"Wanted at least {n_controlled}: add actuators or lower n_flex."
+        )
+    root = np.ones((len(input_gains), 1, n_u)) if weights is None else np.sqrt(weights)[:, None, :]
+    weighted = input_gains * root
+    worst = _worst_condition(weighted)
+    if worst > MAX_CONDITION:
+        raise AssumptionError(
+            f"the actuators cannot drive {n_controlled} modes independently: condition number {worst:.2g}, wanted "
+            f"below {MAX_CONDITION:.0g}. Add actuators or lower n_flex."
+        )
+    return np.asarray(np.swapaxes(root, 1, 2) * np.linalg.pinv(weighted))
+
+
+def _worst_condition(matrices: Array) -> float:
+    """Largest condition number after the rows are normalised: units of the modes do not count."""
+    rows = np.linalg.norm(matrices, axis=2, keepdims=True)
+    if np.any(rows == 0.0):
+        return float("inf")
+    columns = np.linalg.norm(matrices / rows, axis=1, keepdims=True)
+    scaled = matrices / rows / (np.max(columns, axis=2, keepdims=True))
+    return float(np.max(np.linalg.cond(scaled)))

@@ -1,0 +1,90 @@
+"""Peak gains and their derivatives with respect to the augmented controller gain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from lpvhinf.checks import Array
+from lpvhinf.hinfstruct.loop import ClosedLoop
+from lpvhinf.hinfstruct.response import Complex
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PeakGain:
+    r"""Near-maximal singular values at one frequency, with their sensitivities.
+
+    For a unit vector c over the r singular values the function
+    :math:`\mathrm{Re}\,(Uc)^* T (Vc)` is at most the largest singular value, and equal to it at
+    :math:`c = e_1`; its derivative with respect to :math:`\bar K` is
+    :math:`\mathrm{Re}\,(\text{left}^T \bar c)(\text{right}\, c)^T`.
+
+    Attributes
+    ----------
+    omega : float
+    sigma : (r,) the near-maximal singular values, descending
+    left : (r, n_K + n_u), U^* L
+    right : (n_K + n_y, r), Q V
+    """
+
+    omega: float
+    sigma: Array
+    left: Complex
+    right: Complex
+
+    def value(self, c: Complex) -> float:
+        """The gain in the direction c."""
+        return float(np.sum(np.abs(c) ** 2 * self.sigma))
+
+    def gradient(self, c: Complex) -> Array:
+        """Derivative of the gain in the direction c, (n_K + n_u, n_K + n_y)."""
+        return np.asarray(np.outer(c.conj() @ self.left, self.right @ c).real)
+
+
+def peak_gain(loop: ClosedLoop, omega: float, cluster: float = 0.0, most: int = 4) -> PeakGain:
+    """Gain and sensitivities at one frequency by a direct solve.
+
+    Parameters
+    ----------
+    loop : ClosedLoop
+    omega : float
+        rad/s, may be infinity.
+    cluster : float
+        Singular values down to (1 - cluster) times the largest are kept, `most` of them at most.
+    """
+    if np.isfinite(omega) and loop.A.shape[0]:
+        factor = scipy.linalg.lu_factor(
+            1j * omega * np.eye(loop.A.shape[0]) - loop.A, overwrite_a=True, check_finite=False
+        )
+        RB = scipy.linalg.lu_solve(factor, loop.B.astype(complex), check_finite=False)
+        T = loop.C @ RB + loop.D
+        U, sigma, V, r = _near_maximal(T, cluster, most)
+        CR = scipy.linalg.lu_solve(factor, (loop.C.T @ U.conj()).astype(complex), trans=1, check_finite=False).T
+        return PeakGain(omega, sigma[:r], CR @ loop.Bi + U.conj().T @ loop.D12i, loop.Ci @ (RB @ V) + loop.D21i @ V)
+    U, sigma, V, r = _near_maximal(loop.D.astype(complex), cluster, most)
+    return PeakGain(omega, sigma[:r], U.conj().T @ loop.D12i, loop.D21i @ V)
+
+
+def _near_maximal(T: Complex, cluster: float, most: int) -> tuple[Complex, Array, Complex, int]:
+    U, sigma, Vh = np.linalg.svd(T, full_matrices=False)
+    r = int(min(np.sum(sigma >= (1.0 - cluster) * sigma[0]), most))
+    return U[:, :r], sigma, Vh[:r].conj().T, r
+
+
+def directions(sigma: Array, tight: float) -> list[Complex]:
+    """Unit vectors over a cluster of singular values that describe it by cuts.
+
+    Each singular vector alone and, for pairs closer than the fraction `tight`, their equal
+    mixtures (e_i +- e_j) / sqrt 2 and (e_i +- i e_j) / sqrt 2: the largest eigenvalue of a Hermitian
+    matrix is above all these, and the mixtures see its off-diagonal entries.
+    """
+    r = sigma.size
+    eye = np.eye(r, dtype=complex)
+    out = [eye[i] for i in range(r)]
+    for i in range(r):
+        for j in range(i + 1, r):
+            if sigma[j] >= (1.0 - tight) * sigma[0]:
+                out += [(eye[i] + phase * eye[j]) / np.sqrt(2.0) for phase in (1.0, -1.0, 1j, -1j)]
+    return out

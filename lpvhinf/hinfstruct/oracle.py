@@ -1,0 +1,331 @@
+"""The function that is minimised: the largest norm over the plants, its peaks and its derivatives."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+
+from lpvhinf.checks import Array
+from lpvhinf.hinfstruct.curvature import log_gain_hessian
+from lpvhinf.hinfstruct.gradient import PeakGain, directions, peak_gain
+from lpvhinf.hinfstruct.loop import ClosedLoop, LoopFactory, augmented_gain
+from lpvhinf.hinfstruct.norm import NormResult, above_level, exact_norm
+from lpvhinf.hinfstruct.peaks import Peaks, find_peaks
+from lpvhinf.hinfstruct.response import Complex, Response
+from lpvhinf.hinfstruct.structures import ControllerStructure
+from lpvhinf.statespace.generalized import GeneralizedPlant
+
+#: Norms below this count as zero (their logarithm must stay finite).
+SMALLEST = 1e-10
+
+
+@dataclass(slots=True, eq=False)
+class Point:
+    """Parameters with the value of the function there; infinite outside its domain."""
+
+    theta: Array
+    value: float
+    data: Any = None
+
+
+@dataclass(slots=True, eq=False)
+class Cut:
+    """One smooth function: value and gradient at a point, and what it is.
+
+    Below the maximum; where `hard`, one that a step must keep at or below zero.
+    """
+
+    value: float
+    gradient: Array
+    label: tuple[Any, ...]
+    hard: bool = False
+
+
+class Oracle(Protocol):
+    """What the minimisers ask of a maximum of smooth functions."""
+
+    def evaluate(self, theta: Array, cutoff: float = np.inf) -> Point:
+        """The value; above `cutoff` any number above it will do."""
+
+    def gradient(self, point: Point) -> Array:
+        """Gradient of the function that is the maximum."""
+
+    def confirm(self, point: Point) -> Point:
+        """The point with its value checked by exact means."""
+
+    def cuts(self, point: Point, missed: Sequence[Point] = ()) -> list[Cut]:
+        """The functions near the maximum; those that decided at the points `missed` too."""
+
+    def hessian(self, point: Point, weights: Sequence[float], cuts: Sequence[Cut]) -> Array | None:
+        """Weighted sum of the Hessians of cuts at a point; None if not available."""
+
+
+@dataclass(slots=True)
+class Budget:
+    """Wall time and a count of evaluations."""
+
+    deadline: float = np.inf
+    evaluations: int = 0
+    started: float = field(default_factory=time.monotonic)
+
+    @property
+    def spent(self) -> bool:
+        """True if the time is over."""
+        return time.monotonic() >= self.deadline
+
+
+@dataclass(slots=True, eq=False)
+class _Models:
+    """What is known of the closed loops at a point."""
+
+    loops: list[ClosedLoop | None]
+    responses: list[Response | None]
+    peaks: list[Peaks | None]
+    decisive: int
+
+
+class ClosedLoops:
+    """The plants, closed with a structured controller.
+
+    Parameters
+    ----------
+    plants : sequence of GeneralizedPlant
+    structure : ControllerStructure
+    points : sequence of positions or None, one a plant
+    """
+
+    def __init__(
+        self, plants: Sequence[GeneralizedPlant], structure: ControllerStructure, points: Sequence[Array | None]
+    ) -> None:
+        self.structure, self.points = structure, points
+        self.factories = [LoopFactory(plant, structure.n_x) for plant in plants]
+        self.scale = max(float(np.max(np.abs(np.linalg.eigvals(P.A)), initial=1e-3)) for P in plants)
+        self._scheduled = any(p is not None for p in points)
+
+    def gains(self, theta: Array) -> list[Array]:
+        """The augmented gain of every plant."""
+        if not self._scheduled:
+            return [augmented_gain(*self.structure.realize(theta, None))] * len(self.factories)
+        return [augmented_gain(*self.structure.realize(theta, p)) for p in self.points]
+
+    def directions(self, theta: Array, plant: int) -> Array:
+        """Derivatives of the augmented gain by central differences, (n_parameters, n_K + n_u, n_K + n_y)."""
+        p = self.points[plant]
+        out = []
+        for k in range(theta.size):
+            step = np.zeros_like(theta)
+            step[k] = 1e-5 * max(1.0, abs(theta[k]))
+            above = augmented_gain(*self.structure.realize(theta + step, p))
+            out.append((above - augmented_gain(*self.structure.realize(theta - step, p))) / (2.0 * step[k]))
+        return np.array(out)
+
+    def bend(self, theta: Array, plant: int, G: Array) -> Array:
+        """Second derivative of the inner product of G with the augmented gain, by differences of the pullback."""
+        rows = []
+        for k in range(theta.size):
+            step = np.zeros_like(theta)
+            step[k] = 1e-5 * max(1.0, abs(theta[k]))
+            above, below = self.pullback(theta + step, plant, G), self.pullback(theta - step, plant, G)
+            rows.append((above - below) / (2.0 * step[k]))
+        H = np.array(rows)
+        return np.asarray(0.5 * (H + H.T))
+
+    def pullback(self, theta: Array, plant: int, G: Array) -> Array:
+        """Gradient in theta of a function with the gradient `G` in the augmented gain of a plant."""
+        n = self.structure.n_x
+        return np.asarray(
+            self.structure.pullback(theta, G[:n, :n], G[:n, n:], G[n:, :n], G[n:, n:], self.points[plant]), dtype=float
+        )
+
+
+class NormOracle:
+    r"""log of the largest H-infinity norm over the plants; infinite where a loop is not Hurwitz.
+
+    Parameters
+    ----------
+    loops : ClosedLoops
+    budget : Budget
+    fraction : float
+        Peaks above this fraction of the largest become cuts.
+    cluster : float
+        Singular values within this fraction of the largest at a peak become cuts.
+    """
+
+    def __init__(self, loops: ClosedLoops, budget: Budget, *, fraction: float = 0.7, cluster: float = 0.15) -> None:
+        self.loops, self.budget = loops, budget
+        self.fraction, self.cluster = fraction, cluster
+        n = len(loops.factories)
+        self._hints = [np.zeros(0) for _ in range(n)]
+        self._missed = [np.zeros(0) for _ in range(n)]
+        self._order = list(range(n))
+        self._turn = 0
+        self._scale = loops.scale
+
+    def evaluate(self, theta: Array, cutoff: float = np.inf) -> Point:
+        """The value by tracked peaks; the plants that decided last come first, and end a hopeless trial early."""
+        self.budget.evaluations += 1
+        n = len(self._order)
+        models = _Models([None] * n, [None] * n, [None] * n, -1)
+        top = 0.0
+        limit = float(np.exp(cutoff)) * (1.0 + 1e-12) if cutoff < 700.0 else np.inf
+        with np.errstate(over="ignore", invalid="ignore"):
+            gains = self.loops.gains(theta)
+        if not all(np.all(np.isfinite(K)) for K in gains):
+            return Point(theta, np.inf)
+        for rank, i in enumerate(self._order):
+            loop = self.loops.factories[i].close(gains[i])
+            if loop is None or not np.all(np.isfinite(loop.A)):
+                self._promote(rank)
+                return Point(theta, np.inf)
+            try:
+                response = Response(loop.A, loop.B, loop.C, loop.D)
+            except np.linalg.LinAlgError:
+                return Point(theta, np.inf)
+            if response.abscissa >= 0.0:
+                self._promote(rank)
+                return Point(theta, np.inf)
+            extra = np.concatenate([self._hints[i], self._missed[i]])
+            peaks = find_peaks(response, extra=extra, fraction=0.98, floor=top)
+            models.loops[i], models.responses[i], models.peaks[i] = loop, response, peaks
+            if peaks.sigma[0] > top or models.decisive < 0:
+                top, models.decisive = float(peaks.sigma[0]), i
+            if top > limit:
+                self._promote(rank)
+                break
+        return Point(theta, float(np.log(max(top, SMALLEST))), models)
+
+    def _promote(self, rank: int) -> None:
+        self._order.insert(0, self._order.pop(rank))
+
+    def _gain(self, point: Point, plant: int, omega: float, cluster: float) -> PeakGain:
+        loop = point.data.loops[plant]
+        return peak_gain(loop, omega, cluster)
+
+    def gradient(self, point: Point) -> Array:
+        """Gradient of the logarithm of the highest peak."""
+        models: _Models = point.data
+        i = models.decisive
+        peaks = models.peaks[i]
+        assert peaks is not None
+        gain = self._gain(point, i, float(peaks.omega[0]), 0.0)
+        one = np.ones(1, dtype=complex)
+        return self.loops.pullback(point.theta, i, gain.gradient(one)) / max(gain.sigma[0], SMALLEST)
+
+    def confirm(self, point: Point) -> Point:
+        """Level tests on the plants near the maximum and on one more in turn; missed peaks are remembered."""
+        models: _Models = point.data
+        if point.value <= np.log(2.0 * SMALLEST):
+            return point
+        known = [i for i, peaks in enumerate(models.peaks) if peaks is not None]
+        heights = {i: float(models.peaks[i].sigma[0]) for i in known}  # type: ignore[union-attr]
+        top = max(heights.values())
+        near = sorted((i for i in known if heights[i] >= 0.9 * top), key=lambda i: -heights[i])[:3]
+        self._turn = (self._turn + 1) % len(self._order)
+        if self._turn in known and self._turn not in near:
+            near.append(self._turn)
+        for i in near:
+            loop, response = models.loops[i], models.responses[i]
+            assert loop is not None and response is not None
+            found = above_level(loop.A, loop.B, loop.C, loop.D, response, top * (1.0 + 1e-6))
+            if found.size:
+                finite = found[np.isfinite(found)]
+                self._missed[i] = np.concatenate([self._missed[i], finite])[-8:]
+                peaks = find_peaks(response, extra=np.concatenate([self._hints[i], finite]), fraction=0.98)
+                models.peaks[i] = peaks
+                if peaks.sigma[0] > top:
+                    top, models.decisive = float(peaks.sigma[0]), i
+        for i in known:
+            peaks_i = models.peaks[i]
+            assert peaks_i is not None
+            self._hints[i] = peaks_i.omega[np.isfinite(peaks_i.omega)][:6]
+        self._order.sort(key=lambda i: -heights.get(i, 0.0))
+        point.value = float(np.log(max(top, SMALLEST)))
+        return point
+
+    def cuts(self, point: Point, missed: Sequence[Point] = ()) -> list[Cut]:
+        """Every peak above the fraction, at each the cluster of singular values; then the missed frequencies."""
+        models: _Models = point.data
+        top = float(np.exp(point.value))
+        out: list[Cut] = []
+        seen: dict[int, Array] = {}
+        for i, response in enumerate(models.responses):
+            peaks_i = models.peaks[i]
+            assert response is not None and peaks_i is not None
+            if peaks_i.sigma[0] < self.fraction * top:
+                continue
+            extra = np.concatenate([self._hints[i], self._missed[i]])
+            peaks = find_peaks(response, extra=extra, fraction=0.0, floor=self.fraction * top)
+            seen[i] = peaks.omega
+            for omega in peaks.omega:
+                out += self._cuts_at(point, i, float(omega), self.cluster)
+        for other in missed:
+            if other.data is None:
+                continue
+            i = other.data.decisive
+            for omega in other.data.peaks[i].omega[:3]:
+                if i not in seen or not np.any(np.isclose(seen[i], omega, rtol=1e-6)):
+                    out += self._cuts_at(point, i, float(omega), 0.02)
+        return out + self._poles_at_risk(point)
+
+    def _cuts_at(self, point: Point, plant: int, omega: float, cluster: float) -> list[Cut]:
+        gain = self._gain(point, plant, omega, cluster)
+        out = []
+        for c in directions(gain.sigma, 0.03):
+            value = max(gain.value(c), SMALLEST)
+            gradient = self.loops.pullback(point.theta, plant, gain.gradient(c)) / value
+            out.append(Cut(float(np.log(value)), gradient, (plant, omega, np.trim_zeros(c, "b"))))
+        return out
+
+    def _poles_at_risk(self, point: Point) -> list[Cut]:
+        """Poles near the axis: a step may use nine tenths of their distance."""
+        models: _Models = point.data
+        out = []
+        for i, response in enumerate(models.responses):
+            loop = models.loops[i]
+            assert response is not None and loop is not None
+            if response.left is None or response.right is None:
+                continue
+            poles = response.poles
+            risky = np.flatnonzero((poles.imag >= 0.0) & (-poles.real < 0.02 * np.abs(poles) + 1e-3 * self._scale))
+            for k in risky[np.argsort(-poles.real[risky])][:4]:
+                G = np.outer(response.left[k] @ loop.Bi, loop.Ci @ response.right[:, k]).real
+                gradient = self.loops.pullback(point.theta, i, G) / -poles[k].real
+                out.append(Cut(-0.9, gradient, (i, complex(poles[k])), hard=True))
+        return out
+
+    def hessian(self, point: Point, weights: Sequence[float], cuts: Sequence[Cut]) -> Array | None:
+        """Exact Hessian of the weighted sum of logarithms of peaks."""
+        models: _Models = point.data
+        n = point.theta.size
+        out = np.zeros((n, n))
+        pushed: dict[int, Array] = {}
+        for plant in {cut.label[0] for cut in cuts}:
+            dK = self.loops.directions(point.theta, plant)
+            G = np.zeros(dK.shape[1:])
+            for weight, cut in zip(weights, cuts, strict=True):
+                if cut.label[0] == plant:
+                    loop = models.loops[plant]
+                    assert loop is not None
+                    part, gradient = log_gain_hessian(loop, cut.label[1], cut.label[2], dK)
+                    out += weight * part
+                    G += weight * gradient
+            pushed[plant] = G
+        for plant, G in pushed.items():
+            out += self.loops.bend(point.theta, plant, G)
+        return out
+
+    def exact(self, theta: Array) -> list[NormResult]:
+        """The exact norm of every plant's loop, by the controller that `theta` gives."""
+        out = []
+        for i, (factory, K) in enumerate(zip(self.loops.factories, self.loops.gains(theta), strict=True)):
+            loop = factory.close(K)
+            if loop is None:
+                out.append(NormResult(norm=np.inf, omega=np.nan))
+            else:
+                hints = np.concatenate([self._hints[i], self._missed[i]])
+                out.append(exact_norm(loop.A, loop.B, loop.C, loop.D, hints=hints))
+        return out

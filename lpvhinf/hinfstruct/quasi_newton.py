@@ -1,0 +1,127 @@
+"""Nonsmooth BFGS with a weak Wolfe line search."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from lpvhinf.checks import Array
+from lpvhinf.hinfstruct.oracle import Budget, Oracle, Point
+
+ARMIJO, WOLFE = 1e-4, 0.5
+
+
+@dataclass(slots=True, eq=False)
+class Descent:
+    """Where a minimiser ended: the point, the reason, its iterations and its optimality measure."""
+
+    point: Point
+    reason: str
+    iterations: int
+    optimality: float = np.inf
+
+
+def weak_wolfe(
+    oracle: Oracle, point: Point, direction: Array, slope: float, budget: Budget, first: float = 1.0
+) -> tuple[Point | None, Array | None, bool]:
+    """Step along a direction of descent by bisection and doubling.
+
+    Returns the point, its gradient and whether the curvature condition holds too; None without descent.
+    """
+    low, high, t = 0.0, np.inf, first
+    best: tuple[Point, Array] | None = None
+    for _ in range(40):
+        limit = point.value + ARMIJO * t * slope
+        trial = oracle.evaluate(point.theta + t * direction, limit)
+        if trial.value <= limit:
+            trial = oracle.confirm(trial)
+        if not trial.value <= limit:
+            high = t
+        else:
+            gradient = oracle.gradient(trial)
+            best = (trial, gradient)
+            if gradient @ direction >= WOLFE * slope:
+                return trial, gradient, True
+            low = t
+        if budget.spent:
+            break
+        t = 0.5 * (low + high) if np.isfinite(high) else 2.0 * t
+        if np.isfinite(high) and high - low <= 1e-12 * high + 1e-15:
+            break
+        if best is not None and np.isfinite(high) and high - low <= 0.1 * low:
+            break
+    return (None, None, False) if best is None else (*best, False)
+
+
+def bfgs(
+    oracle: Oracle,
+    start: Point,
+    budget: Budget,
+    *,
+    max_iterations: int = 300,
+    tolerance: float = 1e-5,
+    window: int = 15,
+    target: float = -np.inf,
+    accepted: Callable[[Point], None] | None = None,
+) -> Descent:
+    r"""Minimise a maximum of smooth functions from a point of finite value.
+
+    BFGS with a weak Wolfe line search converges to nonsmooth minimisers in practice:
+    the inverse Hessian learns the directions in which the maximum has a kink.
+    It ends below `target`, when the value fell by less than `tolerance` in `window`
+    iterations, or when no descent is found along two steepest directions in turn.
+
+    References
+    ----------
+    Lewis and Overton (2013), Mathematical Programming 141, 135-163.
+    """
+    point = start
+    n = point.theta.size
+    gradient = oracle.gradient(point)
+    H = np.eye(n)
+    fresh = True
+    values = [point.value]
+    for iteration in range(max_iterations):
+        if point.value < target:
+            return Descent(point, "target reached", iteration)
+        if budget.spent:
+            return Descent(point, "time limit", iteration)
+        direction = -H @ gradient
+        slope = float(direction @ gradient)
+        if not np.isfinite(slope) or slope >= -1e-14 * np.linalg.norm(direction) * np.linalg.norm(gradient):
+            if fresh:
+                return Descent(point, "zero gradient", iteration)
+            H, fresh = np.eye(n), True
+            continue
+        size = float(np.linalg.norm(direction))
+        limit = 0.1 * max(1.0, float(np.linalg.norm(point.theta)))
+        if fresh:
+            # without curvature yet: a step of a tenth of theta, at most the change that halves the value
+            direction, slope = direction * (limit / size), slope * (limit / size)
+        elif size > 100.0 * limit:
+            direction, slope = direction * (100.0 * limit / size), slope * (100.0 * limit / size)
+        trial, new_gradient, curved = weak_wolfe(oracle, point, direction, slope, budget)
+        if trial is None or new_gradient is None:
+            if fresh:
+                return Descent(point, "no descent", iteration)
+            H, fresh = np.eye(n), True
+            continue
+        step, change = trial.theta - point.theta, new_gradient - gradient
+        product = float(step @ change)
+        if curved and product > 1e-14 * np.linalg.norm(step) * np.linalg.norm(change):
+            if fresh:
+                H = np.eye(n) * (product / float(change @ change))
+                fresh = False
+            left = step / product
+            Hy = H @ change
+            H = H - np.outer(left, Hy) - np.outer(Hy, left) + (1.0 + float(change @ Hy) / product) * np.outer(step, left)
+            H = 0.5 * (H + H.T)
+        point, gradient = trial, new_gradient
+        values.append(point.value)
+        if accepted is not None:
+            accepted(point)
+        if len(values) > window and values[-1 - window] - values[-1] < tolerance:
+            return Descent(point, "slow progress", iteration + 1)
+    return Descent(point, "iteration limit", max_iterations)

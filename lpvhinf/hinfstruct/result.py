@@ -1,0 +1,92 @@
+"""What a structured synthesis hands back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from lpvhinf.checks import Array
+
+if TYPE_CHECKING:
+    import control
+
+
+@dataclass(frozen=True, kw_only=True)
+class PhaseRecord:
+    """One phase of one start.
+
+    Attributes
+    ----------
+    start : int
+        Number of the start, from zero; initial parameters come first.
+    phase : str
+        "stabilise", "descend" or "polish".
+    evaluations : int
+        Function evaluations of this phase.
+    seconds : float
+        Wall time of this phase.
+    gamma : float
+        Norm at its end (by tracked peaks); infinity if not stabilised.
+    reason : str
+        Why the phase ended.
+    """
+
+    start: int
+    phase: str
+    evaluations: int
+    seconds: float
+    gamma: float
+    reason: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HinfstructResult:
+    """A structured H-infinity controller.
+
+    Attributes
+    ----------
+    gamma : float
+        Largest norm over the plants, recomputed exactly on the closed loops.
+    controller : control.StateSpace
+        K with u = + K y. Where the structure is scheduled, K at `worst_position`.
+    parameters : (n_parameters,)
+        theta of the structure.
+    gammas : (n_plants,)
+        Exact norm of every plant's loop.
+    gamma_worst : float
+        Largest norm over the positions looked at; equal to `gamma` for a sequence of plants.
+    worst_position : (n_p,) or None
+        Position of the plant with the largest norm; None where no `points` were given.
+    worst_frequency : float
+        rad/s, where `gamma` is attained; infinity where the feed-through decides.
+    lower_bound : float or None
+        A lower bound on what any controller reaches. None: not computed, and nothing
+        is claimed about the distance to the global minimum.
+    optimality : float
+        Length of the shortest convex combination of the gradients of log(gain) with respect to theta over the
+        peaks within 1e-4 of the maximum: small at a local minimum (zero at an exact one).
+    status : str
+        How the run ended and what may be done about it.
+    history : tuple of PhaseRecord
+    stabilizing : bool
+        Every closed loop is Hurwitz.
+    """
+
+    gamma: float
+    controller: control.StateSpace
+    parameters: Array
+    gammas: Array
+    gamma_worst: float
+    worst_position: Array | None
+    worst_frequency: float
+    lower_bound: float | None
+    optimality: float
+    status: str
+    history: tuple[PhaseRecord, ...]
+    stabilizing: bool
+
+    def __repr__(self) -> str:
+        return (
+            f"HinfstructResult(gamma={self.gamma:.6g}, {len(self.gammas)} plant(s), "
+            f"{self.parameters.size} parameters, optimality={self.optimality:.2g}, status={self.status!r})"
+        )
