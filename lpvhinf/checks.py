@@ -31,7 +31,10 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...] | No
         If an entry is NaN, infinite or not a real number.
     """
     try:
-        array = np.asarray(value, dtype=float)
+        given = np.asarray(value)
+        if given.dtype.kind in "cSU":  # NumPy would drop the imaginary part, and read "1" as 1
+            raise TypeError(f"entries of type {given.dtype}")
+        array = np.asarray(given, dtype=float)
     except (TypeError, ValueError) as error:
         raise DomainError(f"{name} is not an array of real numbers: {error}. Pass real floats.") from error
     if shape is not None:
@@ -46,7 +49,8 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...] | No
 
 def positive(name: str, value: float, unit: str = "") -> float:
     """`value` if it is a finite number above zero, else a `DomainError`."""
-    if not (np.isscalar(value) and np.isreal(value)) or not np.isfinite(value) or float(value) <= 0.0:
+    number = isinstance(value, int | float | np.integer | np.floating)
+    if not number or not np.isfinite(value) or value <= 0.0:
         raise DomainError(f"{name} is {value!r}, wanted a finite number above 0{' ' + unit if unit else ''}.")
     return float(value)
 
@@ -64,7 +68,8 @@ def box_array(box: ArrayLike) -> Array:
     array = finite_array("box", box, (None, 2))
     if array.shape[0] < 1 or np.any(array[:, 0] >= array[:, 1]):
         raise DomainError(f"box is {array.tolist()}, wanted rows (lower, upper) with lower < upper.")
-    return read_only(array)
+    bounds: Array = read_only(array)
+    return bounds
 
 
 def points_in_box(points: ArrayLike, box: Array, *, name: str = "p") -> Array:

@@ -42,10 +42,10 @@ class MatrixFit:
 
 def degrees(degree: int | Sequence[int], n_p: int) -> tuple[int, ...]:
     """One degree for every axis."""
-    every = (int(degree),) * n_p if np.isscalar(degree) else tuple(int(d) for d in degree)  # type: ignore[arg-type, union-attr]
-    if len(every) != n_p or min(every) < 0:
+    given = np.full(n_p, degree) if np.ndim(degree) == 0 else np.asarray(degree)
+    if given.shape != (n_p,) or not np.issubdtype(given.dtype, np.integer) or np.any(given < 0):
         raise DimensionError(f"degree is {degree!r}, wanted one or {n_p} whole numbers of at least 0.")
-    return every
+    return tuple(int(d) for d in given)
 
 
 def spread_points(box: ArrayLike, n: int, seed: int = 0) -> Array:
@@ -86,10 +86,11 @@ def interpolate(
     """
     bounds = box_array(box)
     size = [d + 1 for d in degrees(degree, len(bounds))]
-    values = finite_array("function(points)", function(nodes(size, bounds)), (None, None, None))
+    grid = nodes(size, bounds)
+    values = finite_array("function(points)", function(grid), (len(grid), None, None))
     matrix = ChebyshevMatrix(from_nodes(values.reshape(*size, *values.shape[1:]), len(bounds)), bounds)
     where = spread_points(bounds, n_test)
-    return _measured(matrix, where, np.asarray(function(where), dtype=float))
+    return _measured(matrix, where, finite_array("function(points)", function(where), (len(where), *matrix.shape)))
 
 
 def least_squares(points: ArrayLike, values: ArrayLike, *, box: ArrayLike, degree: int | Sequence[int]) -> MatrixFit:

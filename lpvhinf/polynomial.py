@@ -1,9 +1,9 @@
-"""Matrices that are polynomial in the position p: tensor Chebyshev series over the box P.
+r"""Matrices that are polynomial in the position p: tensor Chebyshev series over the box P.
 
 This is the one representation of position dependence in the house. With
-:math:`x_k \\in [-1, 1]` the k-th coordinate of p scaled to the box,
+:math:`x_k \in [-1, 1]` the k-th coordinate of p scaled to the box,
 
-.. math:: M(p) = \\sum_{i_1 \\dots i_{n_p}} M_{i_1 \\dots i_{n_p}} T_{i_1}(x_1) \\cdots T_{i_{n_p}}(x_{n_p}).
+.. math:: M(p) = \sum_{i_1 \dots i_{n_p}} M_{i_1 \dots i_{n_p}} T_{i_1}(x_1) \cdots T_{i_{n_p}}(x_{n_p}).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 
 from lpvhinf.checks import Array, box_array, finite_array, points_in_box, read_only
-from lpvhinf.errors import DimensionError
+from lpvhinf.errors import DimensionError, DomainError
 
 CHUNK = 2_000_000  # numbers of the largest temporary basis matrix: 16 MB
 
@@ -98,8 +98,9 @@ class ChebyshevMatrix:
         """The matrices at positions (N, n_p) as (N, rows, cols); a `DomainError` outside the box."""
         where = points_in_box(points, self.box)
         rows, cols = self.shape
-        if self.is_constant:  # a view: one matrix serves every position
-            return np.broadcast_to(self.coefficients.reshape(1, rows, cols), (len(where), rows, cols))
+        if self.is_constant or rows * cols == 0:  # a view: one matrix serves every position
+            constant = self.coefficients[(0,) * self.n_p]
+            return np.broadcast_to(constant, (len(where), rows, cols))
         used: Array = self._used  # type: ignore[attr-defined]
         flat = np.ascontiguousarray(self.coefficients.reshape(-1, rows * cols)[:, used])
         out = np.zeros((len(where), rows * cols))
@@ -107,16 +108,18 @@ class ChebyshevMatrix:
         for start in range(0, len(where), step):
             basis = self._basis(where[start : start + step])
             out[start : start + step, used] = basis @ flat
-        return out.reshape(-1, rows, cols)
+        return out.reshape(len(where), rows, cols)
 
     def _basis(self, points: Array) -> Array:
         """Values of all tensor basis functions, (N, k_1 ... k_np)."""
         x = scaled(points, self.box)
-        factors = [chebyshev.chebvander(x[:, i], d) for i, d in enumerate(self.degree)]
+        factors = [np.asarray(chebyshev.chebvander(x[:, i], d), dtype=float) for i, d in enumerate(self.degree)]
         return reduce(lambda left, right: np.einsum("ni,nj->nij", left, right).reshape(len(points), -1), factors)
 
     def derivative(self, axis: int) -> ChebyshevMatrix:
-        """The partial derivative dM/dp_axis."""
+        """The partial derivative dM/dp_axis, axis = 0 ... n_p - 1."""
+        if not 0 <= axis < self.n_p:  # a negative one would count from the columns
+            raise DomainError(f"axis is {axis}, wanted 0 to {self.n_p - 1}.")
         scale = 2.0 / (self.box[axis, 1] - self.box[axis, 0])
         return ChebyshevMatrix(chebyshev.chebder(self.coefficients, scl=scale, axis=axis), self.box)
 
@@ -237,6 +240,10 @@ def power_to_chebyshev(coefficients: ArrayLike, box: ArrayLike) -> Array:
     """
     bounds = box_array(box)
     values = finite_array("coefficients", coefficients)
+    if values.ndim != len(bounds) + 2:
+        raise DimensionError(
+            f"coefficients has shape {values.shape}, wanted {len(bounds)} axes of powers and then (rows, cols)."
+        )
     for axis, (low, high) in enumerate(bounds):
         n = values.shape[axis]
         x = np.cos(np.pi * (np.arange(n) + 0.5) / n)

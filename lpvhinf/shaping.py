@@ -25,7 +25,7 @@ class Scaling:
     * :math:`W_z^{sc}`: reciprocals of the expected tracking errors.
     * :math:`W_{w1}^{sc} = \mathrm{diag}|G_{nom}(2\pi j f_{bw})|^{-1} (W_z^{sc})^{-1}` (eq. 13) with the
       rigid-body nominal plant, so that every scaled rigid axis is :math:`(\omega_{bw}/s)^2`.
-    * :math:`W_{w2}^{sc} = I` in the paper, for modal forces in the unit that gives a static scaled output
+    * :math:`W_{w2}^{sc} = I` in the paper, for modal forces in the unit that gives a static scaled rigid-body output
       of norm one at the position where the mode is best seen (the paper leaves this unit open, and
       epsilon has a meaning only with it).
 
@@ -33,7 +33,8 @@ class Scaling:
 
     Attributes
     ----------
-    output : (n_rb,) [1/m, 1/rad]
+    output : (n_out,) [1/m, 1/rad]
+        Redundant sensor readings are scaled like the axis with the smallest expected error.
     input : (n_rb + n_flex,) [m/s^2, rad/s^2, N/sqrt(kg)]
         Physical input per unit of scaled input.
     state : (2 n_modes,)
@@ -51,7 +52,9 @@ class Scaling:
         inverse = np.diag(1.0 / self.state)
         state, inputs, outputs = np.diag(self.state), np.diag(self.input), np.diag(self.output)
         return LPVStateSpace(
-            inverse @ system.A @ state, inverse @ system.B @ inputs, outputs @ system.C @ state,
+            inverse @ system.A @ state,
+            inverse @ system.B @ inputs,
+            outputs @ system.C @ state,
             outputs @ system.D @ inputs,
         )
 
@@ -75,9 +78,9 @@ def scaling(plant: DecoupledPlant, f_bw: Array, expected_error: Array, *, n_poin
         if np.any(values <= 0.0):
             raise DomainError(f"{name} is {values.tolist()}, wanted entries above 0.")
     w = 2 * np.pi * f
-    output = 1.0 / error
-    gains = plant.sample(spread_points(plant.box, n_points)).C[:, :, n_rb:]
-    size = np.max(np.linalg.norm(output[:, None] * gains, axis=1), axis=0)
+    output = np.concatenate([1.0 / error, np.full(plant.n_out - n_rb, 1.0 / np.min(error))])
+    gains = plant.sample(spread_points(plant.box, n_points)).C[:, :n_rb, n_rb:]
+    size = np.max(np.linalg.norm(gains / error[:, None], axis=1), axis=0)
     size[size == 0.0] = 1.0
     omega = plant.omega[n_rb:]
     state = np.empty(2 * plant.n_modes)
@@ -147,16 +150,17 @@ class ShapingFilters:
     def W_w3(self, omega: Array) -> Array:
         """Frequency response of the diagonal, (n_omega, n_flex)."""
         x = 1j * omega[:, None] / self.omega_flex
-        return np.asarray(
-            self.epsilon * (x**2 + 2 * self.beta_1 * x + 1) / (x**2 + 2 * self.beta_2 * x + 1)
-        )
+        return np.asarray(self.epsilon * (x**2 + 2 * self.beta_1 * x + 1) / (x**2 + 2 * self.beta_2 * x + 1))
 
     def realize_W_z2(self) -> Filter:
         """(A, B, C, D), one state per axis."""
         pole = self.alpha * 2 * np.pi * self.f_r
         n = len(pole)
         return (
-            -np.diag(pole), np.diag(pole), self.K_r * (1.0 - self.alpha) * np.eye(n), self.K_r * self.alpha * np.eye(n)
+            -np.diag(pole),
+            np.diag(pole),
+            self.K_r * (1.0 - self.alpha) * np.eye(n),
+            self.K_r * self.alpha * np.eye(n),
         )
 
     def realize_W_w3(self) -> Filter:

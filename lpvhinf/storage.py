@@ -6,6 +6,7 @@ import json
 import os
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -77,9 +78,10 @@ def write_arrays(path: str | os.PathLike[str], kind: str, arrays: Mapping[str, A
 def read_arrays(path: str | os.PathLike[str], kind: str) -> dict[str, np.ndarray[Any, Any]]:
     """The arrays of a file of ours; a `StorageError` if it is missing, damaged or of another kind."""
     try:
-        with np.load(path, allow_pickle=False) as data:
+        # an archive or nothing: NumPy would take other files for a single array or a pickle
+        with zipfile.ZipFile(path), np.load(path, allow_pickle=False) as data:
             found = {name: data[name] for name in data.files}
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+    except (OSError, ValueError, KeyError, EOFError, NotImplementedError, zipfile.BadZipFile, zlib.error) as error:
         raise StorageError(f"{path} cannot be read as arrays: {error}. Delete it and run again.") from error
     if str(found.pop("__kind__", "unknown")) != kind or int(found.pop("__format__", -1)) != FORMAT:
         raise StorageError(f"{path} is not a file of kind {kind!r}, format {FORMAT}. Check the path.")

@@ -9,7 +9,7 @@ import numpy as np
 
 from lpvhinf.checks import Array
 from lpvhinf.codesign.specification import Specification
-from lpvhinf.controllers import RigidBodyStructure, initial_gain, observer_model
+from lpvhinf.controllers import RigidBodyStructure, initial_gain, observer_model, process_noise, riccati_gain
 from lpvhinf.decoupling import DecoupledPlant
 from lpvhinf.fitting import interpolate
 from lpvhinf.hinfstruct import BlockDiagonal, ControllerStructure, DiagonalGain, StaticGain
@@ -96,7 +96,7 @@ class Assembly:
     def _loop(self, system: LPVStateSpace, observer: ObserverBranch | None) -> Loop:
         plant = self.scaling.apply(system)
         if self.specification.delay > 0.0:
-            delay = pade_delay(self.specification.delay, self.specification.delay_order, self.plant.n_rb)
+            delay = pade_delay(self.specification.delay, self.specification.delay_order, self.plant.n_out)
             plant = series(plant, LPVStateSpace.from_system(delay, plant.box))
         return Loop(plant=plant, filters=self.filters, n_rb=self.plant.n_rb, observer=observer)
 
@@ -120,19 +120,20 @@ class Assembly:
         """The tuned part diag(K_RB, L, -xi) as a structure for `hinfstruct`."""
         if self.observer is None:
             return self.rigid_body
-        n_rb, n_flex = self.plant.n_rb, self.plant.n_flex
         return BlockDiagonal(
-            self.rigid_body, StaticGain(self.observer.model.n_x, n_rb), DiagonalGain(n_flex)
+            self.rigid_body,
+            StaticGain(self.observer.model.n_x, self.plant.n_out),
+            DiagonalGain(self.plant.n_flex),
         )
 
     def split(self, theta: Array) -> tuple[Array, Array, Array]:
-        """Parameters of K_RB, L (n_o, n_rb) and xi (n_flex,) in theta."""
-        n = self.rigid_body.n_parameters
+        """Parameters of K_RB, L (n_o, n_out) and xi (n_flex,) in theta."""
+        n, n_out = self.rigid_body.n_parameters, self.plant.n_out
         if self.observer is None:
-            return theta, np.zeros((0, self.plant.n_rb)), np.zeros(0)
-        n_o, n_rb = self.observer.model.n_x, self.plant.n_rb
+            return theta, np.zeros((0, n_out)), np.zeros(0)
+        n_o = self.observer.model.n_x
         # the structure tunes u_FM = k v, k = -xi of either sign
-        return theta[:n], theta[n : n + n_o * n_rb].reshape(n_o, n_rb), -theta[n + n_o * n_rb :]
+        return theta[:n], theta[n : n + n_o * n_out].reshape(n_o, n_out), -theta[n + n_o * n_out :]
 
     def tuned_parts(self, theta: Array) -> TunedParts:
         """The tuned part at theta."""
@@ -140,18 +141,35 @@ class Assembly:
         K_RB = self.rigid_body.realize(rigid)
         return TunedParts(K_RB=K_RB) if self.observer is None else TunedParts(K_RB=K_RB, L=L, xi=xi)
 
-    def start(self, points: Array, rigid: Array | None = None, xi: float = 0.1) -> Array:
-        """A first theta: K_RB by rule of thumb or as given, L from the Riccati equation, small xi."""
+    @cached_property
+    def measurement_noise(self) -> Array:
+        """Diagonal of R of the Riccati equation: equal scaled noise on all outputs, at the bandwidth of the loop."""
+        omega_bw = 2 * np.pi * self.scaling.f_bw
+        return 1.0 / np.concatenate([omega_bw, np.full(self.plant.n_out - self.plant.n_rb, np.max(omega_bw))])
+
+    def start(
+        self, points: Array, rigid: Array | None = None, xi: float = 0.1, noise_ratio: float | None = None
+    ) -> Array:
+        """A first theta: K_RB by rule of thumb or as given, L from the Riccati equation, damping gain xi.
+
+        With `noise_ratio` the Riccati equation is solved at the centre of P for this ratio of process noise;
+        without it, for the largest one whose observer is stable at all `points`.
+        """
         if rigid is None:
             rigid = self.rigid_body.parameters(self.rigid_body.rule_of_thumb(self.scaling.f_bw))
         if self.observer is None:
             return np.asarray(rigid)
-        L, _ = initial_gain(
-            self.observer.model,
-            points,
-            n_rb=self.plant.n_rb,
-            omega_bw=2 * np.pi * self.scaling.f_bw,
-            omega_flex=self.omega_flex,
-        )
+        omega_bw = 2 * np.pi * self.scaling.f_bw
+        if noise_ratio is None:
+            L, _ = initial_gain(
+                self.observer.model,
+                points,
+                omega_bw=omega_bw,
+                omega_flex=self.omega_flex,
+                measurement_noise=self.measurement_noise,
+            )
+        else:
+            noise = process_noise(omega_bw, self.omega_flex, noise_ratio)
+            L = riccati_gain(self.observer.model, np.mean(self.plant.box, axis=1), noise, self.measurement_noise)
         gain = L / self.observer.injection[:, None]
         return np.concatenate([rigid, gain.ravel(), np.full(self.plant.n_flex, -xi)])

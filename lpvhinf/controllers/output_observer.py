@@ -6,7 +6,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike
 
-from lpvhinf.checks import Array
+from lpvhinf.checks import Array, finite_array
 from lpvhinf.errors import AssumptionError
 from lpvhinf.polynomial import ChebyshevMatrix
 from lpvhinf.statespace.lpv import LPVStateSpace
@@ -50,12 +50,16 @@ def riccati_gain(model: LPVStateSpace, p: ArrayLike, process_noise: Array, measu
 
     Raises
     ------
+    DimensionError
+        If a diagonal has another length.
     AssumptionError
         If the equation has no stabilising solution there: a preserved mode is not observable.
     """
     A, _, C, _ = (m[0] for m in model.sample(np.reshape(p, (1, -1))))
+    Q = np.diag(finite_array("process_noise", process_noise, (model.n_x,)))
+    R = np.diag(finite_array("measurement_noise", measurement_noise, (model.n_y,)))
     try:
-        X = scipy.linalg.solve_continuous_are(A.T, C.T, np.diag(process_noise), np.diag(measurement_noise))
+        X = scipy.linalg.solve_continuous_are(A.T, C.T, Q, R)
     except (np.linalg.LinAlgError, ValueError) as error:
         raise AssumptionError(
             f"the observer's Riccati equation has no stabilising solution at p = {np.ravel(p).tolist()}: {error}. "
@@ -64,8 +68,18 @@ def riccati_gain(model: LPVStateSpace, p: ArrayLike, process_noise: Array, measu
     return np.asarray(X @ C.T / measurement_noise)
 
 
+def process_noise(omega_bw: Array, omega_flex: Array, ratio: float) -> Array:
+    """Diagonal of Q for scaled states (eta, eta'/omega): noise on all velocities, `ratio` of it on flexible ones.
+
+    With measurement noise 1/omega_bw the rigid-body part of the observer gets the bandwidth of the loop.
+    """
+    noise = np.zeros(2 * (len(omega_bw) + len(omega_flex)))
+    noise[1::2] = np.concatenate([omega_bw, ratio * omega_flex])
+    return noise
+
+
 def initial_gain(
-    model: LPVStateSpace, points: Array, *, n_rb: int, omega_bw: Array, omega_flex: Array
+    model: LPVStateSpace, points: Array, *, omega_bw: Array, omega_flex: Array, measurement_noise: Array
 ) -> tuple[Array, float]:
     r"""A constant L from the Riccati equation for which :math:`A_o - L C_o(p)` is Hurwitz at all `points`.
 
@@ -87,13 +101,9 @@ def initial_gain(
     tries = [centre, *points]
     _, _, C, _ = model.sample(points)
     A = model.A.sample(centre[None])[0]
-    rigid = np.zeros(model.n_x)
-    rigid[1 : 2 * n_rb : 2] = omega_bw
     for ratio in NOISE_RATIOS:
-        noise = rigid.copy()
-        noise[2 * n_rb + 1 :: 2] = ratio * omega_flex
         for p in tries:
-            L = riccati_gain(model, p, noise, 1.0 / omega_bw)
+            L = riccati_gain(model, p, process_noise(omega_bw, omega_flex, ratio), measurement_noise)
             if np.max(np.linalg.eigvals(A - L @ C).real) < 0.0:
                 return L, ratio
     raise AssumptionError(

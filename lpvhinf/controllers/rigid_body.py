@@ -92,6 +92,9 @@ class RigidBodyStructure:
         self.f_I = read_only(finite_array("f_I", f_I, (None,)))
         n = len(self.f_I)
         self.gain_unit = read_only(finite_array("gain_unit", gain_unit, (n,)))
+        for name, values in (("f_I", self.f_I), ("gain_unit", self.gain_unit)):
+            if np.any(values <= 0.0):
+                raise DomainError(f"{name} is {values.tolist()}, wanted entries above 0.")
         self.n_u, self.n_y, self.n_x, self.n_parameters = n, 2 * n, 2 * n, N_PARAMETERS * n
         self.names = tuple(f"K_RB[{i}].{name}" for i in range(n) for name in PARAMETERS)
 
@@ -101,16 +104,14 @@ class RigidBodyStructure:
         return RigidBodyGains(gain=k * self.gain_unit, f_i=f_i, f_d=f_d, f_lp=f_lp, zeta_lp=zeta)
 
     def parameters(self, gains: RigidBodyGains) -> Array:
-        """theta of given physical parameters."""
+        """The parameters theta of given physical ones."""
         columns = (gains.gain / self.gain_unit, gains.f_i, gains.f_d, gains.f_lp, gains.zeta_lp)
-        return np.log(np.stack(columns, axis=1)).ravel()
+        return np.asarray(np.log(np.stack(columns, axis=1))).ravel()
 
     def rule_of_thumb(self, f_bw: ArrayLike) -> RigidBodyGains:
         """The usual start: |K G| = 1 at f_bw for G = 1/s^2, f_i = f_bw/5, f_d = f_bw/3, f_lp = 4 f_bw."""
         f = finite_array("f_bw", f_bw, (len(self.f_I),))
-        start = RigidBodyGains(
-            gain=np.ones_like(f), f_i=f / 5, f_d=f / 3, f_lp=4 * f, zeta_lp=np.full_like(f, 0.7)
-        )
+        start = RigidBodyGains(gain=np.ones_like(f), f_i=f / 5, f_d=f / 3, f_lp=4 * f, zeta_lp=np.full_like(f, 0.7))
         at_crossover = np.abs(np.diagonal(start.response(2 * np.pi * f)))
         gain = (2 * np.pi * f) ** 2 / at_crossover
         return RigidBodyGains(gain=gain, f_i=start.f_i, f_d=start.f_d, f_lp=start.f_lp, zeta_lp=start.zeta_lp)
@@ -128,9 +129,7 @@ class RigidBodyStructure:
         C[axis, first], C[axis, second] = k, k * f_lp / f_d
         return A, B, C, np.zeros((n, 2 * n))
 
-    def pullback(
-        self, theta: Array, GA: Array, GB: Array, GC: Array, GD: Array, p: Array | None = None
-    ) -> Array:
+    def pullback(self, theta: Array, GA: Array, GB: Array, GC: Array, GD: Array, p: Array | None = None) -> Array:
         """The adjoint of the derivative of `realize` to the logarithms."""
         n = len(self.f_I)
         A, B, C, _ = self.realize(theta)
@@ -148,5 +147,3 @@ class RigidBodyStructure:
         """A random start around the rule of thumb for f_bw = 4 f_I."""
         centre = self.parameters(self.rule_of_thumb(4 * self.f_I))
         return centre + 0.3 * rng.standard_normal(self.n_parameters)
-
-

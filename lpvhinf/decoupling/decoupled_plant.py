@@ -8,9 +8,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import ArrayLike
 
-from lpvhinf.checks import Array, points_in_box, read_only
+from lpvhinf.checks import Array, finite_array, points_in_box, read_only
 from lpvhinf.decoupling.partition import compliance_correction, mode_dynamics
 from lpvhinf.decoupling.transformations import input_decoupling, output_decoupling
 from lpvhinf.errors import AssumptionError, DomainError
@@ -33,7 +34,7 @@ class StructureReport:
         Largest deviation of the rigid-body input and output matrices from the identity.
     preserved_excitation : float
         Largest force of a rigid-body input on a preserved flexible mode, relative to the largest
-        force of the same input on any flexible mode.
+        force of the same input on any mode, mass-normalised.
     """
 
     rigid_body: float
@@ -49,9 +50,9 @@ class DecoupledGains:
     ----------
     B : (N, n_modes, n_rb + n_flex)
         Modal accelerations per unit input.
-    C : (N, n_rb, n_modes)
+    C : (N, n_out, n_modes)
         Outputs per unit of every mode.
-    D : (N, n_rb, n_rb + n_flex)
+    D : (N, n_out, n_rb + n_flex)
         Static compliance of the truncated modes.
     """
 
@@ -66,8 +67,10 @@ class DecoupledPlant:
 
     Inputs are the rigid-body accelerations [m/s^2, rad/s^2] and then one mass-normalised modal force
     for each preserved flexible mode; outputs are the rigid-body coordinates about the centre of gravity
-    [m, rad]. Modes are mass-normalised inside; with :math:`q = S \eta_{RB}` the rescaling to these units
-    leaves every rigid axis exactly :math:`1/s^2` for every p.
+    [m, rad] and then, if `sensing` is "all", what redundant sensors read beyond rigid-body motion [m]: an
+    orthonormal basis of the readings that no rigid-body motion explains. Modes are mass-normalised inside;
+    with :math:`q = S \eta_{RB}` the rescaling to these units leaves every rigid axis exactly :math:`1/s^2`
+    for every p.
 
     Make one with `decouple`.
     """
@@ -75,6 +78,7 @@ class DecoupledPlant:
     modal: ModalModel
     n_flex: int
     input_decoupling: str
+    sensing: str
     weight: Weight | None
     degree: int
 
@@ -94,6 +98,20 @@ class DecoupledPlant:
         return self.modal.n_modes
 
     @property
+    def n_out(self) -> int:
+        """Number of outputs: rigid-body coordinates and redundant readings."""
+        return self.n_rb + len(self.redundancy)
+
+    @cached_property
+    def redundancy(self) -> Array:
+        """Orthonormal rows (n_red, n_y) with no rigid-body content at the centre of P; none for "rigid-body"."""
+        centre = np.mean(self.box, axis=1)[None]
+        rigid = self.modal.output_gains(centre)[0][:, : self.n_rb]
+        if self.sensing == "rigid-body":
+            return np.zeros((0, len(rigid)))
+        return np.asarray(scipy.linalg.null_space(rigid.T).T)
+
+    @property
     def omega(self) -> Array:
         """Eigenfrequencies of all modes [rad/s], zero for the rigid-body ones."""
         return self.modal.omega
@@ -109,7 +127,7 @@ class DecoupledPlant:
         return slice(self.n_rb + self.n_flex, None)
 
     def matrices(self, points: ArrayLike) -> tuple[Array, Array]:
-        """T_y (N, n_rb, n_y) and T_u (N, n_u, n_rb + n_flex) at N positions, in the physical units."""
+        """T_y (N, n_out, n_y) and T_u (N, n_u, n_rb + n_flex) at N positions, in the physical units."""
         T_y, T_u, _ = self._transform(points_in_box(points, self.box))
         return T_y, T_u
 
@@ -120,10 +138,17 @@ class DecoupledPlant:
     def _transform(self, points: Array) -> tuple[Array, Array, DecoupledGains]:
         gains = self.modal.gains(points)
         inputs, outputs, compliance = gains.input_gains, gains.output_gains, gains.compliance
-        weights = None if self.weight is None else self.weight(points)
+        weights = (
+            None if self.weight is None else finite_array("weight(points)", self.weight(points), inputs.shape[::2])
+        )
         n_rb, n_ctrl = self.n_rb, self.n_rb + self.n_flex
         S = self.modal.rigid_body_scaling
-        T_y = S @ output_decoupling(outputs[:, :, :n_rb])
+        rigid = outputs[:, :, :n_rb]
+        T_rb = output_decoupling(rigid)
+        # with frame-fixed sensors the readings of rigid-body motion span the same space at every p; the
+        # projection keeps the redundant rows free of it where they do not
+        redundant = self.redundancy - (self.redundancy @ rigid) @ T_rb
+        T_y = np.concatenate([S @ T_rb, redundant], axis=1)
         T_u = input_decoupling(inputs[:, :n_ctrl], weights)
         if self.input_decoupling == "rigid-body":
             # the conventional rigid inputs know nothing of flexible modes; the modal inputs stay the extended ones
@@ -141,12 +166,12 @@ class DecoupledPlant:
         from_modal_inputs = np.max(np.abs(gains.B[:, :n_rb, n_rb:]), initial=0.0)
         rigid = max(
             float(np.max(np.abs(gains.B[:, :n_rb, :n_rb] - identity))),
-            float(np.max(np.abs(gains.C[:, :, :n_rb] - identity))),
+            float(np.max(np.abs(gains.C[:, :, :n_rb] - np.eye(self.n_out, n_rb)))),
             float(from_modal_inputs / max(1.0, np.max(np.abs(gains.B[:, :, n_rb:]), initial=0.0))),
         )
         flexible = np.abs(gains.B[:, n_rb:, :n_rb])
-        largest = np.max(flexible, axis=(0, 1), initial=0.0)
-        largest[largest == 0.0] = 1.0
+        on_rigid = np.max(np.abs(np.linalg.inv(self.modal.rigid_body_scaling)), axis=0)
+        largest = np.maximum(np.max(flexible, axis=(0, 1), initial=0.0), on_rigid)
         excited = float(np.max(flexible[:, : n_ctrl - n_rb] / largest, initial=0.0))
         return StructureReport(rigid, excited, len(gains.B))
 
@@ -166,13 +191,9 @@ class DecoupledPlant:
         for name, (rows, cols) in zip("BCD", shapes, strict=True):
             cut = slice(start, start + rows * cols)
             c = joined.matrix.coefficients[..., 0, cut].reshape(*joined.matrix.coefficients.shape[:-2], rows, cols)
-            size = float(np.max(np.abs(c), initial=0.0))
-            fits[name] = MatrixFit(
-                ChebyshevMatrix(c, self.box).trimmed(1e-13 * size),
-                joined.error[0, cut].reshape(rows, cols),
-                size,
-                joined.n_test,
-            )
+            matrix = ChebyshevMatrix(c, self.box).trimmed(1e-13 * float(np.max(np.abs(c), initial=0.0)))
+            scale = float(np.max(np.abs(matrix.sample(spread_points(self.box, joined.n_test))), initial=0.0))
+            fits[name] = MatrixFit(matrix, joined.error[0, cut].reshape(rows, cols), scale, joined.n_test)
             start += rows * cols
         return fits
 
@@ -187,9 +208,7 @@ class DecoupledPlant:
         gains = self.sample(points)
         box, n_rb = self.box, self.n_rb
         return [
-            self._assemble(
-                ChebyshevMatrix(B[n_rb:], box), ChebyshevMatrix(C[:, n_rb:], box), ChebyshevMatrix(D, box)
-            )
+            self._assemble(ChebyshevMatrix(B[n_rb:], box), ChebyshevMatrix(C[:, n_rb:], box), ChebyshevMatrix(D, box))
             for B, C, D in zip(gains.B, gains.C, gains.D, strict=True)
         ]
 
@@ -206,7 +225,7 @@ class DecoupledPlant:
             exact[..., own, own] = 0.0
             exact[(0,) * len(box)][own, own] = np.eye(self.n_flex)
             B_modes = ChebyshevMatrix(exact, box)
-        C_modes = block([[np.eye(n_rb), C]], box)
+        C_modes = block([[np.eye(self.n_out, n_rb), C]], box)
         velocities, positions = np.zeros((2 * n_modes, n_modes)), np.zeros((n_modes, 2 * n_modes))
         velocities[np.arange(1, 2 * n_modes, 2), np.arange(n_modes)] = 1.0
         positions[np.arange(n_modes), np.arange(0, 2 * n_modes, 2)] = 1.0
@@ -215,7 +234,7 @@ class DecoupledPlant:
         )
 
     def static_correction(self, points: ArrayLike) -> Array:
-        """Compliance of everything that the observer leaves out, (N, n_rb, n_rb + n_flex): D_o of eq. 9."""
+        """Compliance of everything that the observer leaves out, (N, n_out, n_rb + n_flex): D_o of eq. 9."""
         gains, d = self.sample(points), self.discarded
         return compliance_correction(gains.C[:, :, d], gains.B[:, d], self.omega[d]) + gains.D
 
@@ -226,6 +245,7 @@ def decouple(
     n_flex: int = 1,
     actuation: str = "over",
     input_decoupling: str = "extended",
+    sensing: str = "all",
     weight: Weight | None = None,
     degree: int = 40,
 ) -> DecoupledPlant:
@@ -241,6 +261,10 @@ def decouple(
     input_decoupling : "extended" or "rigid-body"
         Whether the rigid-body inputs also avoid the preserved flexible modes (eq. 7), or are those of the
         conventional decoupling (eq. 6), which excites them.
+    sensing : "all" or "rigid-body"
+        Whether redundant sensors stay available to an observer. T_y of eq. 6 alone ("rigid-body") throws away
+        what they read beyond rigid-body motion, which may be the only output that sees a flexible mode with
+        the same sign at every position.
     weight : callable (N, n_p) -> (N, n_u), optional
         Weights of the actuators in the pseudo-inverse; default those of the plant, else ones.
     degree : int
@@ -261,10 +285,17 @@ def decouple(
         raise DomainError(f"actuation is {actuation!r}, wanted 'over': more actuators than decoupled modes.")
     if input_decoupling not in ("extended", "rigid-body"):
         raise DomainError(f"input_decoupling is {input_decoupling!r}, wanted 'extended' or 'rigid-body'.")
-    if not 0 <= n_flex <= modal.n_modes - modal.n_rb:
+    if sensing not in ("all", "rigid-body"):
+        raise DomainError(f"sensing is {sensing!r}, wanted 'all' or 'rigid-body'.")
+    if n_flex not in range(modal.n_modes - modal.n_rb + 1):
         raise DomainError(f"n_flex is {n_flex}, wanted 0 to {modal.n_modes - modal.n_rb} flexible modes.")
     decoupled = DecoupledPlant(
-        modal=modal, n_flex=n_flex, input_decoupling=input_decoupling, weight=weight, degree=degree
+        modal=modal,
+        n_flex=n_flex,
+        input_decoupling=input_decoupling,
+        sensing=sensing,
+        weight=weight,
+        degree=degree,
     )
     points = read_only(np.vstack([np.mean(modal.box, axis=1)[None], spread_points(modal.box, 32)]))
     _check_observable(decoupled.sample(points), decoupled)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from lpvhinf.checks import Array
-from lpvhinf.errors import AssumptionError
+from lpvhinf.errors import AssumptionError, DomainError
 
 MAX_CONDITION = 1e10
 
@@ -37,13 +37,15 @@ def output_decoupling(output_gains: Array) -> Array:
         raise AssumptionError(
             f"{n_y} sensors cannot tell {n_rb} rigid-body modes apart. Add sensors, or keep fewer modes."
         )
-    worst = _worst_condition(output_gains)
+    modes = np.swapaxes(output_gains, 1, 2)
+    worst = _worst_condition(modes)
     if worst > MAX_CONDITION:
         raise AssumptionError(
             f"the sensors do not observe every rigid-body mode: condition number {worst:.2g}, wanted below "
             f"{MAX_CONDITION:.0g}. Move or add a sensor."
         )
-    return np.asarray(np.linalg.pinv(output_gains))
+    size = np.linalg.norm(modes, axis=2, keepdims=True)
+    return np.asarray(np.swapaxes(np.linalg.pinv(modes / size), 1, 2) / size)
 
 
 def input_decoupling(input_gains: Array, weights: Array | None = None) -> Array:
@@ -66,6 +68,8 @@ def input_decoupling(input_gains: Array, weights: Array | None = None) -> Array:
 
     Raises
     ------
+    DomainError
+        If a weight is below zero.
     AssumptionError
         If there are too few actuators, or they cannot drive the modes independently.
 
@@ -75,6 +79,8 @@ def input_decoupling(input_gains: Array, weights: Array | None = None) -> Array:
     [[[0.5], [0.5]]]
     """
     n_controlled, n_u = input_gains.shape[1:]
+    if weights is not None and np.any(weights < 0.0):
+        raise DomainError(f"the weights have the entry {np.min(weights):.4g}, wanted entries of at least 0.")
     active = n_u if weights is None else int(np.min(np.sum(weights > 0.0, axis=1)))
     if active < n_controlled:
         raise AssumptionError(
@@ -89,14 +95,13 @@ def input_decoupling(input_gains: Array, weights: Array | None = None) -> Array:
             f"the actuators cannot drive {n_controlled} modes independently: condition number {worst:.2g}, wanted "
             f"below {MAX_CONDITION:.0g}. Add actuators or lower n_flex."
         )
-    return np.asarray(np.swapaxes(root, 1, 2) * np.linalg.pinv(weighted))
+    size = np.linalg.norm(weighted, axis=2, keepdims=True)
+    return np.asarray(np.swapaxes(root, 1, 2) * np.linalg.pinv(weighted / size) / np.swapaxes(size, 1, 2))
 
 
 def _worst_condition(matrices: Array) -> float:
-    """Largest condition number after the rows are normalised: units of the modes do not count."""
+    """Largest condition number after the rows, one a mode, are normalised: units of the modes do not count."""
     rows = np.linalg.norm(matrices, axis=2, keepdims=True)
     if np.any(rows == 0.0):
         return float("inf")
-    columns = np.linalg.norm(matrices / rows, axis=1, keepdims=True)
-    scaled = matrices / rows / (np.max(columns, axis=2, keepdims=True))
-    return float(np.max(np.linalg.cond(scaled)))
+    return float(np.max(np.linalg.cond(matrices / rows)))

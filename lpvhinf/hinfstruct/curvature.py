@@ -10,8 +10,8 @@ from lpvhinf.hinfstruct.loop import ClosedLoop
 from lpvhinf.hinfstruct.response import Complex
 
 
-def log_gain_hessian(loop: ClosedLoop, omega: float, c: Complex, dK: Array) -> tuple[Array, Array]:
-    r"""Hessian of log of the peak gain for a controller gain that moves along given matrices.
+def log_gain_hessian(loop: ClosedLoop, omega: float, c: Complex, dK: Array, offset: float = 0.0) -> tuple[Array, Array]:
+    r"""Hessian of log(peak gain + offset) for a controller gain that moves along given matrices.
 
     In the direction c of a cluster of r singular values the gain is the eigenvalue
     :math:`\lambda` of the Hermitian dilation :math:`H = [[0, T], [T^*, 0]]`, and
@@ -32,11 +32,12 @@ def log_gain_hessian(loop: ClosedLoop, omega: float, c: Complex, dK: Array) -> t
         Unit vector over the r largest singular values.
     dK : (m, n_K + n_u, n_K + n_y)
         Directions of the augmented gain.
+    offset : float
 
     Returns
     -------
-    hessian : (m, m), of log sigma for K + sum_k d_k dK_k
-    weight : (n_K + n_u, n_K + n_y), gradient of log sigma in K, for the second derivative of K itself
+    hessian : (m, m), of log(sigma + offset) for K + sum_k d_k dK_k
+    weight : (n_K + n_u, n_K + n_y), gradient in K, for the second derivative of K itself
     """
     n = loop.A.shape[0]
     moving = bool(np.isfinite(omega) and omega > 0.0 and n)
@@ -87,5 +88,6 @@ def log_gain_hessian(loop: ClosedLoop, omega: float, c: Complex, dK: Array) -> t
         slope = float((u.conj() @ dT @ v).real)
         if bend < 0.0 and abs(slope) < 1e-3 * np.sqrt(-bend * value):
             hessian = hessian - np.outer(coupling, coupling) / bend
-    gradient = gradient / value
-    return hessian / value - np.outer(gradient, gradient), np.outer(left, right).real / value
+    size = value + offset
+    gradient = gradient / size
+    return hessian / size - np.outer(gradient, gradient), np.outer(left, right).real / size

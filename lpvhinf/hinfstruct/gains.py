@@ -144,9 +144,7 @@ class FixedOrder:
     (9, 19)
     """
 
-    def __init__(
-        self, order: int, n_u: int, n_y: int, *, form: str = "full", strictly_proper: bool = False
-    ) -> None:
+    def __init__(self, order: int, n_u: int, n_y: int, *, form: str = "full", strictly_proper: bool = False) -> None:
         self.n_x, self.n_u, self.n_y = _size("order", order, 0), _size("n_u", n_u, 1), _size("n_y", n_y, 1)
         if form not in ("full", "tridiagonal"):
             raise DomainError(f"form is {form!r}, wanted 'full' or 'tridiagonal'.")
@@ -158,9 +156,7 @@ class FixedOrder:
         self._cuts = np.cumsum(counts)[:-1]
         self.n_parameters = sum(counts)
         self.names = tuple(
-            f"{name}[{i},{j}]"
-            for name, mask in zip("ABCD", self._masks, strict=True)
-            for i, j in np.argwhere(mask)
+            f"{name}[{i},{j}]" for name, mask in zip("ABCD", self._masks, strict=True) for i, j in np.argwhere(mask)
         )
 
     def realize(self, theta: Array, p: Array | None = None) -> Realization:

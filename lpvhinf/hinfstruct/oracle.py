@@ -15,7 +15,7 @@ from lpvhinf.hinfstruct.gradient import PeakGain, directions, peak_gain
 from lpvhinf.hinfstruct.loop import ClosedLoop, LoopFactory, augmented_gain
 from lpvhinf.hinfstruct.norm import NormResult, above_level, exact_norm
 from lpvhinf.hinfstruct.peaks import Peaks, find_peaks
-from lpvhinf.hinfstruct.response import Complex, Response
+from lpvhinf.hinfstruct.response import Response
 from lpvhinf.hinfstruct.structures import ControllerStructure
 from lpvhinf.statespace.generalized import GeneralizedPlant
 
@@ -85,7 +85,8 @@ class _Models:
     loops: list[ClosedLoop | None]
     responses: list[Response | None]
     peaks: list[Peaks | None]
-    decisive: int
+    decisive: int = -1
+    top: float = 0.0
 
 
 class ClosedLoops:
@@ -143,7 +144,13 @@ class ClosedLoops:
 
 
 class NormOracle:
-    r"""log of the largest H-infinity norm over the plants; infinite where a loop is not Hurwitz.
+    r"""The largest H-infinity norm over the plants as a function to minimise.
+
+    .. math:: f(\theta) = \log(\max_i \|T_i(\theta)\|_\infty + \delta)
+              + \tfrac{\mu}{2} \log(1 + \|\theta\|^2)
+
+    and infinity where a loop is not Hurwitz. The logarithm tames the huge norms of poor starts; the offset delta
+    makes f regular where the norm falls to zero; the guard mu keeps early iterations from infinite gains.
 
     Parameters
     ----------
@@ -153,10 +160,21 @@ class NormOracle:
         Peaks above this fraction of the largest become cuts.
     cluster : float
         Singular values within this fraction of the largest at a peak become cuts.
+    offset, guard : float
+        delta and mu; both zero or positive.
     """
 
-    def __init__(self, loops: ClosedLoops, budget: Budget, *, fraction: float = 0.7, cluster: float = 0.15) -> None:
-        self.loops, self.budget = loops, budget
+    def __init__(
+        self,
+        loops: ClosedLoops,
+        budget: Budget,
+        *,
+        fraction: float = 0.7,
+        cluster: float = 0.15,
+        offset: float = 0.0,
+        guard: float = 0.0,
+    ) -> None:
+        self.loops, self.budget, self.offset, self.guard = loops, budget, offset, guard
         self.fraction, self.cluster = fraction, cluster
         n = len(loops.factories)
         self._hints = [np.zeros(0) for _ in range(n)]
@@ -165,13 +183,24 @@ class NormOracle:
         self._turn = 0
         self._scale = loops.scale
 
+    def _value(self, theta: Array, top: float) -> float:
+        return float(np.log(max(top, SMALLEST) + self.offset) + 0.5 * self.guard * np.log1p(theta @ theta))
+
+    def _guard_gradient(self, theta: Array) -> Array:
+        return np.asarray(self.guard * theta / (1.0 + theta @ theta))
+
+    @staticmethod
+    def gamma(point: Point) -> float:
+        """The norm at a point; infinite if not stable."""
+        return float(point.data.top) if point.data is not None else np.inf
+
     def evaluate(self, theta: Array, cutoff: float = np.inf) -> Point:
         """The value by tracked peaks; the plants that decided last come first, and end a hopeless trial early."""
         self.budget.evaluations += 1
         n = len(self._order)
-        models = _Models([None] * n, [None] * n, [None] * n, -1)
+        models = _Models([None] * n, [None] * n, [None] * n)
         top = 0.0
-        limit = float(np.exp(cutoff)) * (1.0 + 1e-12) if cutoff < 700.0 else np.inf
+        cutoff += 1e-12 * (1.0 + abs(cutoff))
         with np.errstate(over="ignore", invalid="ignore"):
             gains = self.loops.gains(theta)
         if not all(np.all(np.isfinite(K)) for K in gains):
@@ -193,10 +222,11 @@ class NormOracle:
             models.loops[i], models.responses[i], models.peaks[i] = loop, response, peaks
             if peaks.sigma[0] > top or models.decisive < 0:
                 top, models.decisive = float(peaks.sigma[0]), i
-            if top > limit:
+            if self._value(theta, top) > cutoff:
                 self._promote(rank)
                 break
-        return Point(theta, float(np.log(max(top, SMALLEST))), models)
+        models.top = top
+        return Point(theta, self._value(theta, top), models)
 
     def _promote(self, rank: int) -> None:
         self._order.insert(0, self._order.pop(rank))
@@ -213,12 +243,13 @@ class NormOracle:
         assert peaks is not None
         gain = self._gain(point, i, float(peaks.omega[0]), 0.0)
         one = np.ones(1, dtype=complex)
-        return self.loops.pullback(point.theta, i, gain.gradient(one)) / max(gain.sigma[0], SMALLEST)
+        pulled = self.loops.pullback(point.theta, i, gain.gradient(one))
+        return np.asarray(pulled / (max(gain.sigma[0], SMALLEST) + self.offset) + self._guard_gradient(point.theta))
 
     def confirm(self, point: Point) -> Point:
         """Level tests on the plants near the maximum and on one more in turn; missed peaks are remembered."""
         models: _Models = point.data
-        if point.value <= np.log(2.0 * SMALLEST):
+        if models.top <= 2.0 * SMALLEST:
             return point
         known = [i for i, peaks in enumerate(models.peaks) if peaks is not None]
         heights = {i: float(models.peaks[i].sigma[0]) for i in known}  # type: ignore[union-attr]
@@ -243,13 +274,14 @@ class NormOracle:
             assert peaks_i is not None
             self._hints[i] = peaks_i.omega[np.isfinite(peaks_i.omega)][:6]
         self._order.sort(key=lambda i: -heights.get(i, 0.0))
-        point.value = float(np.log(max(top, SMALLEST)))
+        models.top = top
+        point.value = self._value(point.theta, top)
         return point
 
     def cuts(self, point: Point, missed: Sequence[Point] = ()) -> list[Cut]:
         """Every peak above the fraction, at each the cluster of singular values; then the missed frequencies."""
         models: _Models = point.data
-        top = float(np.exp(point.value))
+        top = models.top
         out: list[Cut] = []
         seen: dict[int, Array] = {}
         for i, response in enumerate(models.responses):
@@ -275,9 +307,10 @@ class NormOracle:
         gain = self._gain(point, plant, omega, cluster)
         out = []
         for c in directions(gain.sigma, 0.03):
-            value = max(gain.value(c), SMALLEST)
-            gradient = self.loops.pullback(point.theta, plant, gain.gradient(c)) / value
-            out.append(Cut(float(np.log(value)), gradient, (plant, omega, np.trim_zeros(c, "b"))))
+            value = gain.value(c)
+            gradient = self.loops.pullback(point.theta, plant, gain.gradient(c))
+            gradient = gradient / (max(value, SMALLEST) + self.offset) + self._guard_gradient(point.theta)
+            out.append(Cut(self._value(point.theta, value), gradient, (plant, omega, np.trim_zeros(c, "b"))))
         return out
 
     def _poles_at_risk(self, point: Point) -> list[Cut]:
@@ -298,7 +331,7 @@ class NormOracle:
         return out
 
     def hessian(self, point: Point, weights: Sequence[float], cuts: Sequence[Cut]) -> Array | None:
-        """Exact Hessian of the weighted sum of logarithms of peaks."""
+        """Exact Hessian of the weighted sum of logarithms of peaks; the guard is left out."""
         models: _Models = point.data
         n = point.theta.size
         out = np.zeros((n, n))
@@ -310,7 +343,7 @@ class NormOracle:
                 if cut.label[0] == plant:
                     loop = models.loops[plant]
                     assert loop is not None
-                    part, gradient = log_gain_hessian(loop, cut.label[1], cut.label[2], dK)
+                    part, gradient = log_gain_hessian(loop, cut.label[1], cut.label[2], dK, self.offset)
                     out += weight * part
                     G += weight * gradient
             pushed[plant] = G

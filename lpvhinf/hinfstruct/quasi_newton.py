@@ -11,6 +11,8 @@ from lpvhinf.checks import Array
 from lpvhinf.hinfstruct.oracle import Budget, Oracle, Point
 
 ARMIJO, WOLFE = 1e-4, 0.5
+#: Longest step, relative to theta.
+REACH = 1.0
 
 
 @dataclass(slots=True, eq=False)
@@ -24,13 +26,16 @@ class Descent:
 
 
 def weak_wolfe(
-    oracle: Oracle, point: Point, direction: Array, slope: float, budget: Budget, first: float = 1.0
+    oracle: Oracle, point: Point, start: Array, direction: Array, budget: Budget, longest: float = np.inf
 ) -> tuple[Point | None, Array | None, bool]:
     """Step along a direction of descent by bisection and doubling.
 
-    Returns the point, its gradient and whether the curvature condition holds too; None without descent.
+    `start` is the gradient at the point; no step is more than `longest` times the
+    direction. Returns the point, its gradient and whether the curvature condition holds
+    too; None without descent.
     """
-    low, high, t = 0.0, np.inf, first
+    slope = float(start @ direction)
+    low, high, t = 0.0, np.inf, min(1.0, longest)
     best: tuple[Point, Array] | None = None
     for _ in range(40):
         limit = point.value + ARMIJO * t * slope
@@ -44,10 +49,12 @@ def weak_wolfe(
             best = (trial, gradient)
             if gradient @ direction >= WOLFE * slope:
                 return trial, gradient, True
+            if t >= longest:
+                return trial, gradient, bool((gradient - start) @ direction > 0.0)
             low = t
         if budget.spent:
             break
-        t = 0.5 * (low + high) if np.isfinite(high) else 2.0 * t
+        t = 0.5 * (low + high) if np.isfinite(high) else min(2.0 * t, longest)
         if np.isfinite(high) and high - low <= 1e-12 * high + 1e-15:
             break
         if best is not None and np.isfinite(high) and high - low <= 0.1 * low:
@@ -96,13 +103,12 @@ def bfgs(
             H, fresh = np.eye(n), True
             continue
         size = float(np.linalg.norm(direction))
-        limit = 0.1 * max(1.0, float(np.linalg.norm(point.theta)))
+        reach = max(1.0, float(np.linalg.norm(point.theta)))
         if fresh:
-            # without curvature yet: a step of a tenth of theta, at most the change that halves the value
-            direction, slope = direction * (limit / size), slope * (limit / size)
-        elif size > 100.0 * limit:
-            direction, slope = direction * (100.0 * limit / size), slope * (100.0 * limit / size)
-        trial, new_gradient, curved = weak_wolfe(oracle, point, direction, slope, budget)
+            # no curvature yet: a step of a tenth of theta
+            direction, size = direction * (0.1 * reach / size), 0.1 * reach
+        # a longer step would leave the region that the start stands for, often for infinity
+        trial, new_gradient, curved = weak_wolfe(oracle, point, gradient, direction, budget, REACH * reach / size)
         if trial is None or new_gradient is None:
             if fresh:
                 return Descent(point, "no descent", iteration)
@@ -116,7 +122,12 @@ def bfgs(
                 fresh = False
             left = step / product
             Hy = H @ change
-            H = H - np.outer(left, Hy) - np.outer(Hy, left) + (1.0 + float(change @ Hy) / product) * np.outer(step, left)
+            H = (
+                H
+                - np.outer(left, Hy)
+                - np.outer(Hy, left)
+                + (1.0 + float(change @ Hy) / product) * np.outer(step, left)
+            )
             H = 0.5 * (H + H.T)
         point, gradient = trial, new_gradient
         values.append(point.value)

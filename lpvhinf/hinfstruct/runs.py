@@ -10,7 +10,7 @@ import numpy as np
 
 from lpvhinf.checks import Array
 from lpvhinf.hinfstruct.bundle import bundle
-from lpvhinf.hinfstruct.oracle import Budget, ClosedLoops, NormOracle, Point
+from lpvhinf.hinfstruct.oracle import SMALLEST, Budget, ClosedLoops, NormOracle, Point
 from lpvhinf.hinfstruct.quasi_newton import bfgs
 from lpvhinf.hinfstruct.result import PhaseRecord
 from lpvhinf.hinfstruct.stabilise import AbscissaOracle, stabilise
@@ -19,6 +19,10 @@ from lpvhinf.statespace.generalized import GeneralizedPlant
 
 #: Random draws of one start until one can be stabilised.
 DRAWS = 4
+#: Guard mu against infinite gains, in the first descent of every other random start.
+GUARD = 0.02
+#: Relative decrease of the norm in 15 iterations below which a descent goes over to the next, then to the polish.
+DESCENT = (3e-2, 1e-2)
 
 Listener = Callable[[str, Array, float], None]
 
@@ -40,11 +44,11 @@ class Task:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Outcome:
-    """Where a start ended: log of the norm (infinite if not stabilised), or the spectral abscissa."""
+    """Where a start ended: its norm (infinite if not stabilised), or the spectral abscissa."""
 
     start: int
     theta: Array
-    value: float
+    gamma: float
     abscissa: float
     optimality: float
     reason: str
@@ -55,13 +59,13 @@ def _budget(task: Task) -> Budget:
     return Budget(deadline=time.monotonic() + task.seconds)
 
 
-def _record(task: Task, phase: str, budget: Budget, value: float, reason: str) -> PhaseRecord:
+def _record(task: Task, phase: str, budget: Budget, gamma: float, reason: str) -> PhaseRecord:
     return PhaseRecord(
         start=task.start,
         phase=phase,
         evaluations=budget.evaluations,
         seconds=time.monotonic() - budget.started,
-        gamma=float(np.exp(value)) if value < 700.0 else np.inf,
+        gamma=gamma,
         reason=reason,
     )
 
@@ -74,16 +78,18 @@ def descend(task: Task, listen: Listener | None = None) -> Outcome:
     theta = task.structure.initial(rng) if task.theta is None else task.theta
     margin = 1e-7 * loops.scale
 
-    def heard(phase: str) -> Callable[[Point], None] | None:
-        return None if listen is None else (lambda point: listen(phase, point.theta, point.value))
-
     best = AbscissaOracle(loops, budget).evaluate(theta)
     reason = "stable already"
     for draw in range(DRAWS if task.theta is None else 1):
         if draw:
             theta = task.structure.initial(rng)
         run = stabilise(
-            loops, theta, budget, margin=margin, max_iterations=task.max_iterations, accepted=heard("stabilise")
+            loops,
+            theta,
+            budget,
+            margin=margin,
+            max_iterations=task.max_iterations,
+            accepted=None if listen is None else (lambda point: listen("stabilise", point.theta, point.value)),
         )
         if run.point.value < best.value or draw == 0:
             best, reason = run.point, run.reason
@@ -91,11 +97,11 @@ def descend(task: Task, listen: Listener | None = None) -> Outcome:
             break
     history = [_record(task, "stabilise", budget, np.inf, reason)]
 
-    def outcome(theta: Array, value: float, reason: str) -> Outcome:
+    def outcome(theta: Array, gamma: float, reason: str) -> Outcome:
         return Outcome(
             start=task.start,
             theta=theta,
-            value=value,
+            gamma=gamma,
             abscissa=best.value,
             optimality=np.inf,
             reason=reason,
@@ -105,43 +111,56 @@ def descend(task: Task, listen: Listener | None = None) -> Outcome:
     if best.value >= 0.0:
         return outcome(best.theta, np.inf, reason)
     budget = Budget(deadline=budget.deadline)
-    oracle = NormOracle(loops, budget)
-    start = oracle.evaluate(best.theta)
-    if not np.isfinite(start.value):
-        return outcome(best.theta, np.inf, "on the stability limit")
-    start = oracle.confirm(start)
-    descent = bfgs(
-        oracle,
-        start,
-        budget,
-        max_iterations=task.max_iterations,
-        tolerance=100.0 * task.tolerance,
-        accepted=heard("descend"),
-    )
-    history.append(_record(task, "descend", budget, descent.point.value, descent.reason))
-    return outcome(descent.point.theta, descent.point.value, descent.reason)
+    theta, gamma = best.theta, np.inf
+    # every other random start is kept from infinite gains at first: both ways find minima that the other misses
+    guards = (GUARD if task.theta is None and task.start % 2 == 0 else 0.0, 0.0)
+    for guard, tolerance in zip(guards, DESCENT, strict=True):
+        # the logarithm at first, then about linear in the norm
+        offset = gamma if np.isfinite(gamma) else 0.0
+        oracle = NormOracle(loops, budget, guard=guard, offset=offset)
+        start = oracle.evaluate(theta)
+        if not np.isfinite(start.value):
+            return outcome(theta, np.inf, "on the stability limit")
+        run = bfgs(
+            oracle,
+            oracle.confirm(start),
+            budget,
+            max_iterations=task.max_iterations,
+            tolerance=tolerance,
+            accepted=_heard(oracle, listen, "descend"),
+        )
+        theta, gamma, reason = run.point.theta, oracle.gamma(run.point), run.reason
+    history.append(_record(task, "descend", budget, gamma, reason))
+    return outcome(theta, gamma, reason)
+
+
+def _heard(oracle: NormOracle, listen: Listener | None, phase: str) -> Callable[[Point], None] | None:
+    return None if listen is None else (lambda point: listen(phase, point.theta, oracle.gamma(point)))
 
 
 def polish(task: Task, listen: Listener | None = None) -> Outcome:
     """Bundle / SQP from a stabilising theta."""
     assert task.theta is not None
     budget = _budget(task)
-    oracle = NormOracle(ClosedLoops(task.plants, task.structure, task.points), budget)
-    start = oracle.confirm(oracle.evaluate(task.theta))
+    loops = ClosedLoops(task.plants, task.structure, task.points)
+    first = NormOracle(loops, budget)
+    gamma = first.gamma(first.evaluate(task.theta))
+    oracle = NormOracle(loops, budget, offset=gamma)
     run = bundle(
         oracle,
-        start,
+        oracle.confirm(oracle.evaluate(task.theta)),
         budget,
         max_iterations=task.max_iterations,
         tolerance=task.tolerance,
-        accepted=None if listen is None else (lambda point: listen("polish", point.theta, point.value)),
+        accepted=_heard(oracle, listen, "polish"),
     )
+    gamma = oracle.gamma(run.point)
     return Outcome(
         start=task.start,
         theta=run.point.theta,
-        value=run.point.value,
+        gamma=gamma,
         abscissa=-np.inf,
-        optimality=run.optimality,
+        optimality=run.optimality * (gamma + oracle.offset) / max(gamma, SMALLEST),
         reason=run.reason,
-        history=(_record(task, "polish", budget, run.point.value, run.reason),),
+        history=(_record(task, "polish", budget, gamma, run.reason),),
     )

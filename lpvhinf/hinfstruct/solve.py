@@ -6,6 +6,7 @@ import multiprocessing
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,9 +14,9 @@ from threadpoolctl import threadpool_limits
 
 from lpvhinf.checks import Array, finite_array, positive, read_only
 from lpvhinf.errors import DimensionError, DomainError, SynthesisError
-from lpvhinf.hinfstruct.oracle import Budget, ClosedLoops, NormOracle
-from lpvhinf.hinfstruct.result import HinfstructResult
-from lpvhinf.hinfstruct.runs import Listener, Outcome, Task, descend, polish
+from lpvhinf.hinfstruct.oracle import SMALLEST, Budget, ClosedLoops, NormOracle
+from lpvhinf.hinfstruct.result import HinfstructResult, PhaseRecord
+from lpvhinf.hinfstruct.runs import Outcome, Task, descend, polish
 from lpvhinf.hinfstruct.structures import ControllerStructure, realize_checked
 from lpvhinf.progress import SILENT, Progress
 from lpvhinf.statespace.generalized import GeneralizedPlant
@@ -100,16 +101,15 @@ def hinfstruct(
 
     Examples
     --------
-    The first-order plant x' = x + w + u with z = (x, u) and y = x: a static gain k < -1
-    gives the norm sqrt(1 + k^2) / (-k - 1), which falls to 1 as the gain grows; with z = x + 2 u
-    added to x it has a minimum.
+    For x' = x + w1 + u, z = (x, u), y = x + w2 the gain u = -k y has its peaks at zero and at
+    infinity; they are equal at k = 1 + sqrt 3, which is also the norm there.
 
     >>> P = GeneralizedPlant([[1.0]], [[1.0, 0.0]], [[1.0]], [[1.0], [0.0]], [[1.0]],
     ...                      [[0.0, 0.0], [0.0, 0.0]], [[0.0], [1.0]], [[0.0, 1.0]])
     >>> from lpvhinf.hinfstruct import StaticGain
     >>> result = hinfstruct(P, StaticGain(1, 1), starts=1)
     >>> result.stabilizing, round(result.gamma, 4)
-    (True, 2.4142)
+    (True, 2.7321)
     """
     models = _plants(plants, controller)
     positions = _positions(points, len(models))
@@ -147,11 +147,11 @@ def hinfstruct(
     begins: list[Array | None] = [*given, *([None] * starts)]
     runner = _Runner(progress, checkpoint, jobs, deadline)
     with threadpool_limits(limits=1):
-        outcomes = runner.map(descend, [task(k, theta, np.inf) for k, theta in enumerate(begins)], share=0.6)
-        best = min(outcome.value for outcome in outcomes)
+        outcomes = runner.map(descend, [task(k, theta, np.inf) for k, theta in enumerate(begins)], share=0.4)
+        best = min(outcome.gamma for outcome in outcomes)
         if np.isfinite(best):
             hopeful = sorted(
-                (o for o in outcomes if o.value <= best + np.log(HOPELESS)), key=lambda o: (o.value, o.start)
+                (o for o in outcomes if o.gamma <= max(HOPELESS * best, SMALLEST)), key=lambda o: (o.gamma, o.start)
             )
             polished = runner.map(polish, [task(o.start, o.theta, np.inf) for o in hopeful], share=1.0)
         else:
@@ -168,7 +168,7 @@ def hinfstruct(
             result = _result(oracle, closest, controller, positions, status, history)
             raise SynthesisError(status, result)
         # tracked peaks rank the candidates, exact norms decide
-        ranked = sorted(polished, key=lambda o: (o.value, o.start))
+        ranked = sorted(polished, key=lambda o: (o.gamma, o.start))
         results = [_result(oracle, o, controller, positions, _status(o), history) for o in ranked[:3]]
     return min(results, key=lambda r: r.gamma)
 
@@ -182,7 +182,9 @@ def _plants(
                 f"controller is {type(controller).__name__} without {name!r}, wanted an object that follows the "
                 "ControllerStructure protocol, such as StaticGain(n_u, n_y)."
             )
-    models = (plants,) if isinstance(plants, GeneralizedPlant) else tuple(plants) if isinstance(plants, Sequence) else ()
+    models = (
+        (plants,) if isinstance(plants, GeneralizedPlant) else tuple(plants) if isinstance(plants, Sequence) else ()
+    )
     if not models or not all(isinstance(P, GeneralizedPlant) for P in models):
         raise DomainError(
             f"plants is {type(plants).__name__}, wanted a GeneralizedPlant or a sequence with at least one. "
@@ -208,7 +210,7 @@ def _positions(points: ArrayLike | None, n: int) -> tuple[Array | None, ...]:
 def _initial(initial: ArrayLike | Sequence[ArrayLike] | None, n: int) -> list[Array]:
     if initial is None:
         return []
-    array = finite_array("initial", initial)
+    array = finite_array("initial", initial)  # type: ignore[arg-type]
     if array.ndim == 1:
         array = array[None]
     if array.ndim != 2 or array.shape[1] != n or array.shape[0] < 1:
@@ -234,7 +236,7 @@ class _Runner:
             out = []
             for k, task in enumerate(tasks):
                 self.progress.stage(f"{work.__name__} {k + 1} of {len(tasks)} (start {task.start})")
-                out.append(work(_limited(task, end, len(tasks) - k), self.listener()))
+                out.append(work(_limited(task, end, len(tasks) - k), self.hear))
             return out
         self.progress.stage(f"{work.__name__}, {len(tasks)} starts in {workers} processes", len(tasks))
         waves = -(-len(tasks) // workers)
@@ -243,15 +245,11 @@ class _Runner:
             futures = [pool.submit(work, _limited(task, end, waves)) for task in tasks]
             for future in futures:
                 outcome = future.result()
-                self.hear("", outcome.theta, outcome.value)
+                self.hear("", outcome.theta, outcome.gamma)
             return [future.result() for future in futures]
 
-    def listener(self) -> Listener:
-        """A listener that knows nothing of the phase's inner workings."""
-        return self.hear
-
     def hear(self, phase: str, theta: Array, value: float) -> None:
-        """Pass on progress; a better point goes to the checkpoint."""
+        """Pass on the norm (while stabilising: the abscissa) at theta; a better point goes to the checkpoint."""
         self.iteration += 1
         if phase == "stabilise":
             self.progress.update(1, abscissa=value, iteration=self.iteration)
@@ -259,13 +257,11 @@ class _Runner:
         if value < self.best:
             self.best = value
             if self.checkpoint is not None:
-                self.checkpoint(theta.copy(), float(np.exp(value)))
-        self.progress.update(1, gamma=float(np.exp(min(self.best, 700.0))), iteration=self.iteration)
+                self.checkpoint(theta.copy(), value)
+        self.progress.update(1, gamma=self.best, iteration=self.iteration)
 
 
 def _limited(task: Task, end: float, parts: int) -> Task:
-    from dataclasses import replace
-
     return replace(task, seconds=max(0.0, (end - time.monotonic()) / parts))
 
 
@@ -284,11 +280,13 @@ def _status(outcome: Outcome) -> str:
             "stopped by max_iterations before convergence; the controller is valid. Raise max_iterations, or pass its "
             "parameters as initial to go on."
         )
+    if outcome.gamma <= 1e-6:
+        return "the norm is practically zero; nothing is left to gain unless the channels are scaled badly."
     if outcome.optimality <= 1e-3:
         return "converged to a local minimum. Raise starts to look for a better one."
     return (
         f"no further progress ({outcome.reason}); optimality {outcome.optimality:.2g} is not small, so it may not be a "
-        "local minimum, or the minimum lies at infinite parameters. Raise starts, or bound the controller by a weight on u."
+        "local minimum, or the minimum lies at infinite parameters. Raise starts, or put a weight on u."
     )
 
 
@@ -298,7 +296,7 @@ def _result(
     controller: ControllerStructure,
     positions: tuple[Array | None, ...],
     status: str,
-    history: tuple,  # type: ignore[type-arg]
+    history: tuple[PhaseRecord, ...],
 ) -> HinfstructResult:
     import control
 

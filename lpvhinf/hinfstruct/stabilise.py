@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+import scipy.linalg
 
 from lpvhinf.checks import Array
 from lpvhinf.hinfstruct.bundle import bundle
 from lpvhinf.hinfstruct.loop import ClosedLoop
 from lpvhinf.hinfstruct.oracle import Budget, ClosedLoops, Cut, Point
 from lpvhinf.hinfstruct.quasi_newton import Descent, bfgs
+from lpvhinf.hinfstruct.response import Complex
 
 
 class AbscissaOracle:
@@ -33,7 +35,7 @@ class AbscissaOracle:
     def evaluate(self, theta: Array, cutoff: float = np.inf) -> Point:
         """The value; infinite if a loop is not well posed."""
         self.budget.evaluations += 1
-        closed: list[tuple[ClosedLoop, Array]] = []
+        closed: list[tuple[ClosedLoop, Complex]] = []
         value = -np.inf
         with np.errstate(over="ignore", invalid="ignore"):
             gains = self.loops.gains(theta)
@@ -41,7 +43,7 @@ class AbscissaOracle:
             loop = factory.close(K) if np.all(np.isfinite(K)) else None
             if loop is None or not np.all(np.isfinite(loop.A)):
                 return Point(theta, np.inf)
-            poles = np.linalg.eigvals(loop.A)
+            poles = np.linalg.eigvals(loop.A).astype(complex)
             closed.append((loop, poles))
             value = max(value, float(np.max(poles.real, initial=-np.inf)))
             if value > cutoff:
@@ -74,8 +76,6 @@ class AbscissaOracle:
         return [self._pole_cut(point, i, point.data[i][0], pole) for _, i, pole in found[:most]]
 
     def _pole_cut(self, point: Point, plant: int, loop: ClosedLoop, pole: complex) -> Cut:
-        import scipy.linalg
-
         poles, W, V = scipy.linalg.eig(loop.A, left=True, right=True)
         k = int(np.argmin(np.abs(poles - pole)))
         w, v = W[:, k], V[:, k]
@@ -101,7 +101,14 @@ def stabilise(
     if not np.isfinite(start.value):
         return Descent(start, "not well posed", 0)
     run = bfgs(
-        oracle, start, budget, max_iterations=max_iterations, tolerance=1e-6, window=40, target=-margin, accepted=accepted
+        oracle,
+        start,
+        budget,
+        max_iterations=max_iterations,
+        tolerance=1e-6,
+        window=40,
+        target=-margin,
+        accepted=accepted,
     )
     if run.point.value >= -margin and not budget.spent:
         run = bundle(oracle, run.point, budget, max_iterations=60, target=-margin, accepted=accepted)

@@ -52,9 +52,7 @@ class ControllerStructure(Protocol):
     def realize(self, theta: Array, p: Array | None = None) -> Realization:
         """(A, B, C, D) at the parameters `theta` and, where it is scheduled, the position `p`."""
 
-    def pullback(
-        self, theta: Array, GA: Array, GB: Array, GC: Array, GD: Array, p: Array | None = None
-    ) -> Array:
+    def pullback(self, theta: Array, GA: Array, GB: Array, GC: Array, GD: Array, p: Array | None = None) -> Array:
         r"""The adjoint of the derivative of `realize`.
 
         Entry k is :math:`\langle G_A, \partial A/\partial\theta_k\rangle + \dots + \langle G_D, \partial

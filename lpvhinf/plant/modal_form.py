@@ -154,7 +154,7 @@ def _physical_basis(M: Array, K: Array, E: Array) -> tuple[Array, Array, Array]:
     M_rb = E.T @ M @ E
     values, vectors = np.linalg.eigh(M_rb)
     unit = np.sqrt(np.diag(M_rb))
-    if np.any(unit == 0.0) or np.linalg.eigvalsh(M_rb / np.outer(unit, unit))[0] < 1e-10:
+    if np.any(unit == 0.0) or np.linalg.eigvalsh(M_rb / np.outer(unit, unit)).min(initial=1.0) < 1e-10:
         raise AssumptionError("rigid_body_modes are linearly dependent, wanted a basis. Remove the repeated motions.")
     S = (vectors / np.sqrt(values)) @ vectors.T
     return E @ S, M_rb, S

@@ -31,6 +31,7 @@ import numpy as np
 
 from lpvhinf.checks import Array
 from lpvhinf.controllers import band_pass, velocity_selection
+from lpvhinf.errors import AssumptionError
 from lpvhinf.problems.wiring import Signal, Wiring
 from lpvhinf.shaping import ShapingFilters
 from lpvhinf.statespace.lpv import LPVStateSpace
@@ -72,7 +73,7 @@ class TunedParts:
     Attributes
     ----------
     K_RB : (A, B, C, D) from (e, x_I) to u_RB
-    L : (n_o, n_rb), or None without an observer
+    L : (n_o, n_out), or None without an observer
     xi : (n_flex,), or None; positive values damp
     """
 
@@ -88,7 +89,7 @@ class Loop:
     Attributes
     ----------
     plant : LPVStateSpace
-        The scaled decoupled plant: inputs (u_1, u_2), outputs y.
+        The scaled decoupled plant: inputs (u_1, u_2), outputs y, the first n_rb of them controlled.
     filters : ShapingFilters
     n_rb : int
     observer : ObserverBranch or None
@@ -116,7 +117,14 @@ class Loop:
             With the shaping filters and z = (z1, z2), or without them and z = (e, u_RB, u_FM).
         flexible_input : bool
             Whether w = (w1, w2, w3) or only (w1, w2).
+
+        Raises
+        ------
+        AssumptionError
+            If K_RB has a feed-through, or the loop has an observer and L or xi is missing.
         """
+        if controller is not None:
+            self._check(controller)
         n_rb, n_flex, observer = self.n_rb, self.n_in, self.observer
         n_o = 0 if observer is None else observer.model.n_x
         n_fm = 0 if observer is None else n_flex
@@ -144,7 +152,7 @@ class Loop:
             u_RB, u_FM = wiring.input("u_RB"), wiring.input("u_FM")
         else:
             u_RB = controller.K_RB[2] @ wiring.state("K_RB")
-            u_FM = velocities if controller.xi is None else -np.diag(controller.xi) @ velocities
+            u_FM = velocities if observer is None else -np.diag(np.asarray(controller.xi)) @ velocities
         seen = u_RB + wiring.input("w2")  # W_w2 = I
         force = self._flexible_force(wiring, u_FM, W_w3, weighted=weighted, flexible_input=flexible_input)
 
@@ -152,7 +160,8 @@ class Loop:
         inputs_of_plant = wiring.stack(seen, force)
         wiring.set_derivative("plant", self.plant.A @ x + self.plant.B @ inputs_of_plant)
         y = self.plant.C @ x + self.plant.D @ inputs_of_plant
-        e = -(y + wiring.input("w1"))  # W_w1 = I
+        rigid = y[slice(0, n_rb), slice(None)]  # further outputs are redundant sensors, for the observer only
+        e = -(rigid + wiring.input("w1"))  # W_w1 = I
         integral = wiring.state("integral")
         wiring.set_derivative("integral", np.diag(2 * np.pi * self.filters.f_I) @ e)
 
@@ -171,6 +180,13 @@ class Loop:
         if controller is None:
             outputs = [*outputs, e, integral, innovation, velocities]
         return wiring.read(outputs)
+
+    def _check(self, controller: TunedParts) -> None:
+        """Whether the tuned parts are those of this loop."""
+        if np.any(controller.K_RB[3]):
+            raise AssumptionError("K_RB has a feed-through, wanted a strictly proper one. Give it a low-pass filter.")
+        if self.observer is not None and (controller.L is None or controller.xi is None):
+            raise AssumptionError("the loop has an observer, but L or xi is None. Give both.")
 
     def _flexible_force(
         self, wiring: Wiring, u_FM: Signal, W_w3: StateSpaceArrays, *, weighted: bool, flexible_input: bool

@@ -27,4 +27,4 @@ def six_block(loop: Loop) -> LPVGeneralizedPlant:
         raise AssumptionError("the loop has no observer, wanted one for the 6-block problem. Use four_block instead.")
     system = loop.wire(controller=None, weighted=True, flexible_input=True)
     n_o, n_flex, n_rb = loop.observer.model.n_x, loop.observer.n_flex, loop.n_rb
-    return LPVGeneralizedPlant(system, n_u=n_rb + n_o + n_flex, n_y=3 * n_rb + n_flex)
+    return LPVGeneralizedPlant(system, n_u=n_rb + n_o + n_flex, n_y=2 * n_rb + loop.plant.n_y + n_flex)

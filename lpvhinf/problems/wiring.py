@@ -38,9 +38,7 @@ class Wiring:
     [[-1.0]]
     """
 
-    def __init__(
-        self, box: ArrayLike, *, states: Sequence[tuple[str, int]], inputs: Sequence[tuple[str, int]]
-    ) -> None:
+    def __init__(self, box: ArrayLike, *, states: Sequence[tuple[str, int]], inputs: Sequence[tuple[str, int]]) -> None:
         self.box = np.asarray(box, dtype=float)
         self._places: dict[str, slice] = {}
         end = 0

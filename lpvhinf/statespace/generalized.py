@@ -119,9 +119,7 @@ class GeneralizedPlant:
         return int(self.C2.shape[0])
 
     def __repr__(self) -> str:
-        return (
-            f"GeneralizedPlant(n_x={self.n_x}, n_w={self.n_w}, n_u={self.n_u}, n_z={self.n_z}, n_y={self.n_y})"
-        )
+        return f"GeneralizedPlant(n_x={self.n_x}, n_w={self.n_w}, n_u={self.n_u}, n_z={self.n_z}, n_y={self.n_y})"
 
     @classmethod
     def from_control(cls, P: control.StateSpace, n_y: int, n_u: int) -> GeneralizedPlant:

@@ -62,8 +62,8 @@ def feedback(forward: LPVStateSpace, backward: LPVStateSpace, sign: int = -1) ->
         block([[forward.D, forward.D], [forward.D, forward.D]], forward.box),
     )
     gain = float(np.sign(sign))
-    return lft(stacked, LPVStateSpace(backward.A, backward.B, gain * np.eye(backward.n_y) @ backward.C,
-                                      gain * np.eye(backward.n_y) @ backward.D))
+    signed = gain * np.eye(backward.n_y)
+    return lft(stacked, LPVStateSpace(backward.A, backward.B, signed @ backward.C, signed @ backward.D))
 
 
 def lft(plant: LPVStateSpace, controller: LPVStateSpace) -> LPVStateSpace:

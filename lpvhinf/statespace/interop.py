@@ -37,7 +37,10 @@ def state_space_matrices(system: Any) -> tuple[Array, Array, Array, Array]:
         matrices = (system.A, system.B, system.C, system.D)
     elif hasattr(system, "to_ss"):  # scipy.signal.lti in another form
         _continuous(system)
-        converted = system.to_ss()
+        try:
+            converted = system.to_ss()
+        except TypeError as error:  # control.FRD
+            raise DomainError(f"system is a {type(system).__name__}: {error} Fit a model to it first.") from error
         matrices = (converted.A, converted.B, converted.C, converted.D)
     elif hasattr(system, "num") and hasattr(system, "den"):
         import control
@@ -46,7 +49,7 @@ def state_space_matrices(system: Any) -> tuple[Array, Array, Array, Array]:
         converted = control.ss(system)
         matrices = (converted.A, converted.B, converted.C, converted.D)
     elif isinstance(system, int | float | np.ndarray):
-        D = np.atleast_2d(np.asarray(system, dtype=float))
+        D = np.atleast_2d(finite_array("D", system))
         matrices = (np.zeros((0, 0)), np.zeros((0, D.shape[1])), np.zeros((D.shape[0], 0)), D)
     else:
         raise DomainError(

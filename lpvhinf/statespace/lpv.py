@@ -67,7 +67,7 @@ class LPVStateSpace:
         given = (A, B, C, D)
         box = next((m.box for m in given if isinstance(m, ChebyshevMatrix)), None)
         if box is None:
-            raise DimensionError("A, B, C, D are all plain arrays and name no box. Use from_coefficients(..., box=...).")
+            raise DimensionError("A, B, C, D are plain arrays and name no box. Use from_coefficients(..., box=...).")
         anchor = ChebyshevMatrix(np.zeros((0, 0)), box)
         a, b, c, d = (anchor._like(m) for m in given)
         (n_x, n_u), n_y = b.shape, c.shape[0]
@@ -238,7 +238,8 @@ class LPVStateSpace:
             f"<tr><th>{name}</th><td>{m.shape[0]} x {m.shape[1]}</td><td>{m.degree}</td></tr>"
             for name, m in self._named()
         )
-        return f"<b>LPVStateSpace</b> over {self.box.tolist()}<table><tr><th></th><th>size</th><th>degree</th></tr>{rows}</table>"
+        head = "<tr><th></th><th>size</th><th>degree</th></tr>"
+        return f"<b>LPVStateSpace</b> over {self.box.tolist()}<table>{head}{rows}</table>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,9 +267,8 @@ def _split(cls: type[LPVStateSpace], fitted: MatrixFit, shapes: Sequence[tuple[i
         cut = slice(start, start + rows * cols)
         c = fitted.matrix.coefficients[..., 0, cut]
         # entries whose variation is round-off are constants: a sparse matrix stays sparse and cheap
-        matrices.append(
-            ChebyshevMatrix(c.reshape(*c.shape[:-1], rows, cols), box).trimmed(1e-15 * float(np.max(np.abs(c), initial=0.0)))
-        )
+        round_off = 1e-15 * float(np.max(np.abs(c), initial=0.0))
+        matrices.append(ChebyshevMatrix(c.reshape(*c.shape[:-1], rows, cols), box).trimmed(round_off))
         errors[name] = fitted.error[0, cut].reshape(rows, cols)
         start += rows * cols
     return LPVFit(cls(*matrices), errors, fitted.n_test)

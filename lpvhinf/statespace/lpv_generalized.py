@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from lpvhinf.checks import Array
@@ -56,7 +57,7 @@ class LPVGeneralizedPlant:
 
     def at(self, p: ArrayLike) -> GeneralizedPlant:
         """The frozen plant at one position."""
-        return self.sample([list(map(float, p))])[0]  # type: ignore[arg-type, union-attr]
+        return self.sample(np.reshape(np.asarray(p, dtype=float), (1, -1)))[0]
 
     def sample(self, points: ArrayLike) -> list[GeneralizedPlant]:
         """The frozen plants at positions (N, n_p)."""

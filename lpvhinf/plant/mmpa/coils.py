@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.polynomial import legendre
 
 from lpvhinf.checks import Array, read_only
 from lpvhinf.plant.mmpa.parameters import MMPAParameters
@@ -15,8 +16,9 @@ from lpvhinf.plant.mmpa.parameters import MMPAParameters
 class CoilLayer:
     """A layer of equal rectangular coils on a regular grid; coil (i, j) is number i * len(y) + j of the layer.
 
-    The current of every coil is counted counter-clockwise, seen from above. A bundle of turns is a set of
-    rectangular filaments, each of which carries `turns` times the coil current.
+    The current of every coil is counted counter-clockwise, seen from above. The bundle of turns is a uniform current
+    density; rectangular filaments at Gauss points over its width and height stand for it, and filament (f, h)
+    carries ``share[f] * turns[h]`` times the coil current.
 
     Attributes
     ----------
@@ -24,18 +26,21 @@ class CoilLayer:
         Centres of the coils in the stator frame [m].
     half_x, half_y : (n_filaments,)
         Half sides of the filaments of a bundle, at one height [m].
+    share : (n_filaments,)
+        Share of the current in each of them; sums to 1.
     z : (n_heights,)
         Heights of the filaments from the neutral plane of the mover [m].
-    turns : float
-        Turns that one filament stands for.
+    turns : (n_heights,)
+        Turns that each height stands for.
     """
 
     x: Array
     y: Array
     half_x: Array
     half_y: Array
+    share: Array
     z: Array
-    turns: float
+    turns: Array
 
     @property
     def n_coils(self) -> int:
@@ -58,17 +63,19 @@ def coil_layers(parameters: MMPAParameters) -> tuple[CoilLayer, CoilLayer]:
     (80, 80, [-18.5, -25.0])
     """
     p = parameters
-    inset = (np.arange(p.filaments_width) + 0.5) / p.filaments_width * p.bundle_width
-    height = ((np.arange(p.filaments_height) + 0.5) / p.filaments_height - 0.5) * p.bundle_height
+    t, share = legendre.leggauss(p.filaments_width)
+    inset, share = 0.5 * (t + 1.0) * p.bundle_width, read_only(0.5 * share)
+    t, turns = legendre.leggauss(p.filaments_height)
+    height, turns = 0.5 * t * p.bundle_height, read_only(0.5 * p.turns * turns)
     short = (np.arange(p.coils_short) - (p.coils_short - 1) / 2) * p.pitch_short
     long = (np.arange(p.coils_long) - (p.coils_long - 1) / 2) * p.pitch_long
     half_short, half_long = p.coil_short / 2 - inset, p.coil_long / 2 - inset
-    turns = p.turns / (p.filaments_width * p.filaments_height)
     upper = CoilLayer(
         x=read_only(short),
         y=read_only(long),
         half_x=read_only(half_short),
         half_y=read_only(half_long),
+        share=share,
         z=read_only(p.layer_heights[0] + height),
         turns=turns,
     )
@@ -77,6 +84,7 @@ def coil_layers(parameters: MMPAParameters) -> tuple[CoilLayer, CoilLayer]:
         y=read_only(short),
         half_x=read_only(half_long),
         half_y=read_only(half_short),
+        share=share,
         z=read_only(p.layer_heights[1] + height),
         turns=turns,
     )

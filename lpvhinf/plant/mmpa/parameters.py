@@ -64,7 +64,7 @@ class MMPAParameters:
     bundle_width, bundle_height : float
         Cross-section of the winding [m].
     turns, filaments_width, filaments_height : int
-        Turns, and filaments that stand for them over the width and the height of the bundle.
+        Turns, and Gauss points that stand for them over the width and the height of the bundle.
     window_short, window_long : (float, float)
         Commutation: coils whose centre is within the first distance of the mover's centre have the weight 1, beyond
         the second one 0, along the coil's short and long axis [m].
@@ -111,7 +111,7 @@ class MMPAParameters:
     magnet_count_half: int = 8
     magnet_limit: float = 0.1351
     field_taper: float = 0.030
-    field_taper_order: int = 4
+    field_taper_order: int = 2
     gap: float = 0.0015
     layer_spacing: float = 0.0005
     coils_short: int = 16
@@ -123,11 +123,11 @@ class MMPAParameters:
     bundle_width: float = 0.011
     bundle_height: float = 0.006
     turns: int = 100
-    filaments_width: int = 4
-    filaments_height: int = 2
-    window_short: tuple[float, float] = (0.11, 0.17)
-    window_long: tuple[float, float] = (0.08, 0.20)
-    window_order: int = 3
+    filaments_width: int = 6
+    filaments_height: int = 3
+    window_short: tuple[float, float] = (0.050, 0.214)
+    window_long: tuple[float, float] = (0.153, 0.194)
+    window_order: int = 2
     travel: float = 0.060
     sensor_z_half_span: float = 0.080
     sensor_xy_half_span: float = 0.080

@@ -16,8 +16,8 @@ the generalised force of a filament on P_i P_j is
 
     \Delta e_i\, \Delta j_j - \Delta j_i\, \Delta e_j + \beta_1 (\Delta h_i\, \Delta k_j - \Delta k_i\, \Delta h_j)
 
-where the sums :math:`\beta_0 = \sum n B_1(z)` and :math:`\beta_1 = \sum n z B_1(z)` run over the heights of the
-bundle. On a grid of coils all of this is one small matrix product for each layer and position.
+where the sums :math:`\beta_0 = \sum n B_1(z)` and :math:`\beta_1 = \sum n z B_1(z)` run over the heights of
+the bundle. On a grid of coils all of this is one small matrix product for each layer and position.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ class SeparableWrench:
             mine = np.flatnonzero(piece == i)
             low, high = self._breaks[i], self._breaks[i + 1]
             local = (2.0 * flat[mine] - low - high) / (high - low)
-            out[mine, 2:] = (legendre.legvander(local, TABLE_DEGREE + 1) @ self._tables[i]).reshape(-1, 2, n)
+            out[mine, 2:] = (legendre.legvander(local, self._tables.shape[1] - 1) @ self._tables[i]).reshape(-1, 2, n)
         return out.reshape(*x.shape, 4, n), np.stack([w, wc], axis=-1).reshape(*x.shape, 2)
 
     def _differences(self, p: Array, centres: Array, half: Array, beta: tuple[float, float]) -> tuple[Array, Array]:
@@ -136,7 +136,8 @@ class SeparableWrench:
             part = slice(start, start + layer.n_coils)
             start += layer.n_coils
             columns, rows, b1 = len(layer.x), len(layer.y), beta[1]
-            # left factor (e, -j, b1 h, -b1 k) times right factor (j, e, k, h), summed over kinds and filaments
+            # left factor share (e, -j, b1 h, -b1 k) times right factor (j, e, k, h), summed over kinds and filaments
+            X, x_edge = X * layer.share[:, None, None], x_edge * layer.share[:, None]
             left = X[:, :, :, [0, 2, 1, 3]] * np.array([1.0, -1.0, b1, -b1])[:, None]
             right = Y[:, :, :, [2, 0, 3, 1]]
             left = left.reshape(N, columns, -1, n).transpose(0, 1, 3, 2).reshape(N, columns * n, -1)

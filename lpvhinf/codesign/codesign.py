@@ -1,0 +1,160 @@
+"""Structured co-design of K_RB, L and xi over all positions."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from lpvhinf.checks import Array, finite_array, points_in_box, read_only
+from lpvhinf.codesign.assembly import ARCHITECTURES, Assembly
+from lpvhinf.codesign.design import Design
+from lpvhinf.codesign.positions import design_positions, norms_at, worst_position
+from lpvhinf.codesign.specification import Specification
+from lpvhinf.codesign.starts import observer_starts
+from lpvhinf.decoupling import DecoupledPlant
+from lpvhinf.errors import DomainError
+from lpvhinf.hinfstruct import HinfstructResult, hinfstruct
+from lpvhinf.progress import SILENT, Progress
+
+Checkpoint = Callable[[Array, float], None]
+
+
+def codesign(
+    decoupled: DecoupledPlant,
+    architecture: str = "output-observer",
+    specification: Specification | None = None,
+    *,
+    positions: ArrayLike | None = None,
+    n_positions: int = 13,
+    warm_start: Design | ArrayLike | None = None,
+    starts: int = 2,
+    exchange_rounds: int = 2,
+    exchange_tolerance: float = 0.01,
+    n_search: int = 128,
+    max_iterations: int = 150,
+    tolerance: float = 1e-4,
+    time_limit: float | None = None,
+    seed: int = 0,
+    jobs: int = 1,
+    progress: Progress = SILENT,
+    checkpoint: Checkpoint | None = None,
+) -> Design:
+    r"""Minimise the largest :math:`\|M(p)\|_\infty` over P with the structure diag(K_RB, L, xi).
+
+    The norm counts at a set of design positions, with the plant model itself. Positions found to be
+    worse join the set and the design goes on, until none is worse by `exchange_tolerance`.
+
+    Parameters
+    ----------
+    decoupled : DecoupledPlant
+        From `decouple`.
+    architecture : "rigid-body" or "output-observer"
+        The conventional 4-block design of K_RB, or the 6-block design with the output-based modal observer.
+    specification : Specification
+    positions : (N, n_p), optional
+        Design positions; default the corners of P and an even spread, `n_positions` in all.
+    warm_start : Design or (n_theta,), optional
+        A conventional design gives K_RB to start an observer design from; one of the same architecture, or
+        its parameters, are the start itself. Without it the conventional design is made first.
+    starts : int
+        Number of starts of the observer design: the best of a screening of Riccati gains and damping gains.
+    exchange_rounds, exchange_tolerance, n_search
+        At most so many rounds of worst-position exchange, each over `n_search` positions.
+    max_iterations : int
+        Of each phase of the solver.
+    tolerance : float
+        Relative decrease of gamma that is still worth a step.
+    time_limit : [s], optional
+        Per solver run.
+    seed, jobs : int
+    progress : Progress
+    checkpoint : callable, optional
+        Gets every better (theta, gamma), so that a caller can save it.
+
+    Returns
+    -------
+    Design
+
+    Raises
+    ------
+    DomainError
+        If the architecture is unknown or a position lies outside of P.
+    SynthesisError
+        If no stabilising parameters are found.
+    """
+    began = time.monotonic()
+    spec = Specification() if specification is None else specification
+    if architecture not in ARCHITECTURES:
+        raise DomainError(f"architecture is {architecture!r}, wanted one of {', '.join(ARCHITECTURES)}.")
+    if architecture != "rigid-body" and decoupled.n_flex == 0:
+        raise DomainError("n_flex is 0, wanted at least 1 preserved flexible mode for an observer design.")
+    spec.warn_if_demanding(decoupled)
+    assembly = Assembly(plant=decoupled, specification=spec, architecture=architecture)
+    active = (
+        design_positions(decoupled.box, n_positions, seed=seed)
+        if positions is None
+        else points_in_box(positions, decoupled.box, name="positions")
+    )
+
+    def solve(initial: list[Array]) -> HinfstructResult:
+        return hinfstruct(
+            assembly.generalized_plants(active),
+            assembly.structure,
+            initial=initial,
+            starts=0,
+            seed=seed,
+            jobs=jobs,
+            max_iterations=max_iterations,
+            tolerance=tolerance,
+            time_limit=time_limit,
+            progress=progress,
+            checkpoint=checkpoint,
+        )
+
+    if architecture == "output-observer" and warm_start is None:
+        warm_start = codesign(
+            decoupled, "rigid-body", spec, positions=active, exchange_rounds=0, n_search=1, seed=seed,
+            max_iterations=max_iterations, tolerance=tolerance, time_limit=time_limit, progress=progress,
+        )  # fmt: skip
+    initial = _initial(assembly, active, warm_start, starts)
+    progress.stage(f"{architecture}: {len(active)} positions, {assembly.structure.n_parameters} parameters")
+    result = solve(initial)
+    for round_number in range(exchange_rounds + 1):
+        progress.stage(f"{architecture}: worst position over P")
+        worst = worst_position(assembly, result.parameters, n_search=n_search, seed=seed + 1)
+        progress.log(f"{architecture}: gamma {result.gamma:.4f} at the design positions, {worst.gamma:.4f} over P")
+        new = worst.candidates[worst.gammas > (1.0 + exchange_tolerance) * result.gamma]
+        if len(new) == 0 or round_number == exchange_rounds:
+            break
+        active = np.vstack([active, new])
+        result = solve([np.asarray(result.parameters)])
+    gammas = norms_at(assembly, result.parameters, active)
+    beyond = worst.gamma > np.max(gammas)
+    return Design(
+        assembly=assembly,
+        parameters=read_only(result.parameters),
+        positions=read_only(active),
+        gammas=read_only(gammas),
+        gamma_worst=max(worst.gamma, float(np.max(gammas))),
+        worst_position=read_only(worst.position if beyond else active[int(np.argmax(gammas))]),
+        optimality=result.optimality,
+        status=result.status,
+        seconds=time.monotonic() - began,
+    )
+
+
+def _initial(
+    assembly: Assembly, active: Array, warm_start: Design | ArrayLike | None, starts: int
+) -> list[Array]:
+    """Starts of the solver, from what the caller has."""
+    if warm_start is None:
+        return [assembly.start(active)]
+    if not isinstance(warm_start, Design):
+        return [finite_array("warm_start", warm_start, (assembly.structure.n_parameters,))]
+    if warm_start.architecture == assembly.architecture:
+        return [np.asarray(warm_start.parameters)]
+    rigid = warm_start.assembly.split(warm_start.parameters)[0]
+    return observer_starts(assembly, active, rigid, starts)

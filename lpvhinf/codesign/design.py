@@ -1,0 +1,203 @@
+"""A finished co-design: its parameters in physical units, its controller and its closed loops over P."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lpvhinf.checks import Array
+from lpvhinf.codesign.assembly import Assembly
+from lpvhinf.codesign.specification import Specification
+from lpvhinf.controllers import RigidBodyGains, band_pass, velocity_selection
+from lpvhinf.problems.wiring import Wiring
+from lpvhinf.statespace.lpv import LPVStateSpace
+from lpvhinf.storage import write_arrays
+
+KIND = "lpvhinf.Design"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Design:
+    """What `codesign` returns.
+
+    Attributes
+    ----------
+    assembly : Assembly
+        Plant, specification and architecture.
+    parameters : (n_theta,)
+        The tuned parameters theta.
+    positions : (N, n_p) [m]
+        Design positions, those added by the worst-position search included.
+    gammas : (N,)
+        Exact norms of M there, with the plant model itself.
+    gamma_worst, worst_position
+        The largest exact norm that the worst-position search found over P, and where.
+    optimality : float
+        Norm of the smallest convex combination of active gradients; small at a local minimum.
+    status : str
+        What the solver says of its end.
+    seconds : float
+        Time spent.
+    """
+
+    assembly: Assembly
+    parameters: Array
+    positions: Array
+    gammas: Array
+    gamma_worst: float
+    worst_position: Array
+    optimality: float
+    status: str
+    seconds: float
+
+    @property
+    def architecture(self) -> str:
+        """The architecture: "rigid-body" or "output-observer"."""
+        return self.assembly.architecture
+
+    @property
+    def specification(self) -> Specification:
+        """What was asked for."""
+        return self.assembly.specification
+
+    @property
+    def gamma(self) -> float:
+        """Largest exact norm of M over the design positions."""
+        return float(np.max(self.gammas))
+
+    @property
+    def stabilizing(self) -> bool:
+        """Whether every loop at a design position is Hurwitz."""
+        return bool(np.all(np.isfinite(self.gammas)))
+
+    @cached_property
+    def K_RB(self) -> RigidBodyGains:
+        """The rigid-body controller in physical units."""
+        return self.assembly.rigid_body.gains(self.assembly.split(self.parameters)[0])
+
+    @cached_property
+    def L(self) -> Array | None:
+        """The observer gain (n_o, n_out), from innovations [m, rad] to physical modal states; None without observer."""
+        observer, scaling = self.assembly.observer, self.assembly.scaling
+        if observer is None:
+            return None
+        L = self.assembly.split(self.parameters)[1]
+        unit = scaling.state[: len(L)] * observer.injection
+        return np.asarray(unit[:, None] * L * scaling.output)
+
+    @cached_property
+    def xi(self) -> Array | None:
+        """Gains of K_FM, (n_flex,) [N/sqrt(kg) per m sqrt(kg)/s = 1/s]; positive damps."""
+        if self.assembly.observer is None:
+            return None
+        scaling, n_rb, n_flex = self.assembly.scaling, self.assembly.plant.n_rb, self.assembly.plant.n_flex
+        velocity = scaling.state[2 * n_rb + 1 : 2 * (n_rb + n_flex) : 2]
+        return np.asarray(self.assembly.split(self.parameters)[2] * scaling.input[n_rb:] / velocity)
+
+    @cached_property
+    def controller(self) -> LPVStateSpace:
+        """The controller from (e, y) [m, rad] to (u_RB, u_FM) [m/s^2, rad/s^2, N/sqrt(kg)].
+
+        e = r - y_RB; the observer is fed with all outputs y = (y_RB, redundant readings) and the controller's own
+        outputs.
+        """
+        assembly, tuned = self.assembly, self.assembly.tuned_parts(self.parameters)
+        n_rb, scaling, observer = assembly.plant.n_rb, assembly.scaling, assembly.observer
+        states = [("integral", n_rb), ("K_RB", tuned.K_RB[0].shape[0])]
+        if observer is not None:
+            states += [("observer", observer.model.n_x), ("band_pass", 2 * observer.n_flex)]
+        wiring = Wiring(assembly.plant.box, states=states, inputs=[("e", n_rb), ("y", len(scaling.output))])
+        e, y = np.diag(scaling.output[:n_rb]) @ wiring.input("e"), np.diag(scaling.output) @ wiring.input("y")
+        wiring.set_derivative("integral", np.diag(2 * np.pi * assembly.filters.f_I) @ e)
+        u_RB = wiring.drive("K_RB", tuned.K_RB, wiring.stack(e, wiring.state("integral")))
+        outputs = [np.diag(scaling.input[:n_rb]) @ u_RB]
+        if observer is not None:
+            x, model = wiring.state("observer"), observer.model
+            estimates = velocity_selection(n_rb, observer.n_flex) @ x
+            u_FM = -np.diag(tuned.xi) @ wiring.drive("band_pass", band_pass(observer.omega, observer.Q), estimates)
+            u = wiring.stack(u_RB, u_FM)
+            innovation = y - model.C @ x - model.D @ u
+            gain = observer.injection[:, None] * np.asarray(tuned.L)
+            wiring.set_derivative("observer", model.A @ x + model.B @ u + gain @ innovation)
+            outputs.append(np.diag(scaling.input[n_rb:]) @ u_FM)
+        return wiring.read(outputs)
+
+    @cached_property
+    def closed_loop(self) -> LPVStateSpace:
+        """The unweighted loop in physical units, polynomial in p.
+
+        Inputs: an output disturbance w1 [m, rad], an acceleration w2 at u_RB [m/s^2, rad/s^2] that the observer
+        sees, a modal force w3 [N/sqrt(kg)]; outputs: e [m, rad], u_RB [m/s^2, rad/s^2], u_FM [N/sqrt(kg)].
+        """
+        scaling, n_rb = self.assembly.scaling, self.assembly.plant.n_rb
+        loop = self.assembly.loop.wire(
+            controller=self.assembly.tuned_parts(self.parameters), weighted=False, flexible_input=True
+        )
+        u_FM = scaling.input[n_rb:] if self.assembly.observer is not None else scaling.input[n_rb:][:0]
+        left = np.concatenate([1.0 / scaling.output[:n_rb], scaling.input[:n_rb], u_FM])
+        right = np.concatenate([scaling.output[:n_rb], 1.0 / scaling.input])
+        rows, columns = np.diag(left[: loop.n_y]), np.diag(right)
+        return LPVStateSpace(loop.A, loop.B @ columns, rows @ loop.C, rows @ loop.D @ columns)
+
+    @cached_property
+    def performance_loop(self) -> LPVStateSpace:
+        """The weighted loop from w to z = -M w, integrators absorbed, polynomial in p; Hurwitz where stable."""
+        return self.assembly.loop.wire(
+            controller=self.assembly.tuned_parts(self.parameters),
+            weighted=True,
+            flexible_input=self.assembly.observer is not None,
+        )
+
+    def frozen(self, points: Array, *, weighted: bool = False) -> list[tuple[Array, Array, Array, Array]]:
+        """Closed loops (A, B, C, D), scaled units, with the plant model itself at positions (N, n_p).
+
+        Inputs are (w1, w2, w3), outputs (e, u_RB, u_FM), or (z1, z2) if `weighted`.
+        """
+        tuned = self.assembly.tuned_parts(self.parameters)
+        centre = np.mean(self.assembly.plant.box, axis=1)[None]
+        out = []
+        for loop in self.assembly.frozen_loops(points):
+            A, B, C, D = loop.wire(controller=tuned, weighted=weighted, flexible_input=True).sample(centre)
+            out.append((A[0], B[0], C[0], D[0]))
+        return out
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a folder: parameters and figures of the design, plant, controller and closed loops as arrays."""
+        folder = Path(path)
+        arrays: dict[str, Any] = {
+            "parameters": self.parameters,
+            "positions": self.positions,
+            "gammas": self.gammas,
+            "gamma_worst": self.gamma_worst,
+            "worst_position": self.worst_position,
+            "optimality": self.optimality,
+            "status": np.array(self.status),
+            "seconds": self.seconds,
+            "architecture": np.array(self.architecture),
+            "K_RB": np.stack([getattr(self.K_RB, n) for n in ("gain", "f_i", "f_d", "f_lp", "zeta_lp")]),
+            "f_bw": self.assembly.scaling.f_bw,
+            "scaling_output": self.assembly.scaling.output,
+            "scaling_input": self.assembly.scaling.input,
+            "scaling_state": self.assembly.scaling.state,
+        }
+        if self.L is not None and self.xi is not None:
+            arrays |= {"L": self.L, "xi": self.xi}
+        self.assembly.plant.system.save(folder / "plant.npz")
+        self.controller.save(folder / "controller.npz")
+        self.closed_loop.save(folder / "closed_loop.npz")
+        self.performance_loop.save(folder / "performance_loop.npz")
+        write_arrays(folder / "design.npz", KIND, arrays)  # last: a folder with it is complete
+
+    def report(self) -> str:
+        """The design in a few lines of text."""
+        from lpvhinf.codesign.report import design_text
+
+        return design_text(self)
+
+    def __repr__(self) -> str:
+        return f"Design({self.architecture!r}, gamma={self.gamma:.4g}, gamma_worst={self.gamma_worst:.4g})"

@@ -1,0 +1,101 @@
+"""The minimisers on maxima of known functions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from lpvhinf.checks import Array
+from lpvhinf.hinfstruct.bundle import bundle, convex_model, quadratic_model, shortest_combination
+from lpvhinf.hinfstruct.oracle import Budget, Cut, Point
+from lpvhinf.hinfstruct.quasi_newton import bfgs
+
+
+class MaxOfQuadratics:
+    """max_i (x - c_i)^T H_i (x - c_i) / 2 + b_i, infinite where x[0] > wall."""
+
+    def __init__(self, seed: int, n: int, m: int, wall: float = np.inf) -> None:
+        rng = np.random.default_rng(seed)
+        self.centres, self.offsets, self.wall = rng.standard_normal((m, n)), rng.standard_normal(m), wall
+        roots = rng.standard_normal((m, n, n))
+        self.H = roots @ roots.transpose(0, 2, 1) + 0.1 * np.eye(n)
+
+    def parts(self, x: Array) -> tuple[Array, Array]:
+        d = x - self.centres
+        Hd = np.einsum("kij,kj->ki", self.H, d)
+        return 0.5 * np.sum(d * Hd, axis=1) + self.offsets, Hd
+
+    def evaluate(self, theta: Array, cutoff: float = np.inf) -> Point:
+        return Point(theta, np.inf if theta[0] > self.wall else float(np.max(self.parts(theta)[0])))
+
+    def confirm(self, point: Point) -> Point:
+        return point
+
+    def gradient(self, point: Point) -> Array:
+        values, gradients = self.parts(point.theta)
+        return np.asarray(gradients[np.argmax(values)])
+
+    def cuts(self, point: Point, missed: Sequence[Point] = ()) -> list[Cut]:
+        return [Cut(float(v), g, (i,)) for i, (v, g) in enumerate(zip(*self.parts(point.theta), strict=True))]
+
+    def hessian(self, point: Point, weights: Sequence[float], cuts: Sequence[Cut]) -> Array | None:
+        return np.asarray(sum(w * self.H[cut.label[0]] for w, cut in zip(weights, cuts, strict=True)))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_bundle_reaches_the_optimality_condition_of_a_convex_maximum(seed: int) -> None:
+    oracle = MaxOfQuadratics(seed, 6, 5)
+    run = bundle(oracle, oracle.evaluate(np.full(6, 3.0)), Budget(), tolerance=1e-10)
+    # zero lies in the convex hull of the active gradients: a global minimum, as the function is convex
+    assert run.optimality < 1e-4
+    assert run.iterations < 60
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_bfgs_comes_close_to_the_same_minimum(seed: int) -> None:
+    oracle = MaxOfQuadratics(seed, 6, 5)
+    best = bundle(oracle, oracle.evaluate(np.full(6, 3.0)), Budget(), tolerance=1e-10).point.value
+    run = bfgs(oracle, oracle.evaluate(np.full(6, 3.0)), Budget(), tolerance=1e-10, max_iterations=1000)
+    assert best - 1e-8 <= run.point.value <= best + 1e-4 * max(1.0, abs(best))
+
+
+def test_points_outside_the_domain_are_never_returned() -> None:
+    oracle = MaxOfQuadratics(0, 3, 3, wall=-1.0)
+    start = oracle.evaluate(np.full(3, -2.0))
+    for run in (bfgs(oracle, start, Budget()), bundle(oracle, start, Budget())):
+        assert np.isfinite(run.point.value)
+        assert run.point.theta[0] <= -1.0
+        assert run.point.value < start.value
+
+
+def test_target_and_deadline() -> None:
+    oracle = MaxOfQuadratics(1, 3, 2)
+    start = oracle.evaluate(np.full(3, 5.0))
+    assert bfgs(oracle, start, Budget(), target=start.value + 1.0).reason == "target reached"
+    assert bfgs(oracle, start, Budget(deadline=0.0)).reason == "time limit"
+    assert bundle(oracle, start, Budget(deadline=0.0)).reason == "time limit"
+
+
+def test_shortest_combination() -> None:
+    length, weights = shortest_combination(np.array([[1.0, 1.0], [1.0, -3.0]]))
+    assert length == pytest.approx(1.0)
+    np.testing.assert_allclose(weights, [0.75, 0.25])
+    assert shortest_combination(np.array([[1.0, 0.0], [-2.0, 0.0]]))[0] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_quadratic_model_keeps_hard_rows() -> None:
+    # minimise -d0 + d0^2/20 with d0 <= 0.5 hard and |d| <= 2
+    G = np.array([[-1.0, 0.0], [1.0, 0.0]])
+    model = quadratic_model(np.array([0.0, -0.5]), G, np.array([False, True]), 0.1 * np.eye(2), 2.0)
+    assert model is not None
+    np.testing.assert_allclose(model.step, [0.5, 0.0], atol=1e-7)
+    assert model.decrease == pytest.approx(0.5)
+
+
+def test_convex_model_is_positive_semidefinite() -> None:
+    rng = np.random.default_rng(0)
+    H = rng.standard_normal((5, 5))
+    model = convex_model(H + H.T, rng.standard_normal((2, 5)), np.array([0.3, 0.7]))
+    assert np.min(np.linalg.eigvalsh(model)) > 0.0
