@@ -146,9 +146,7 @@ def codesign(
     )
 
 
-def _initial(
-    assembly: Assembly, active: Array, warm_start: Design | ArrayLike | None, starts: int
-) -> list[Array]:
+def _initial(assembly: Assembly, active: Array, warm_start: Design | ArrayLike | None, starts: int) -> list[Array]:
     """Starts of the solver, from what the caller has."""
     if warm_start is None:
         return [assembly.start(active)]

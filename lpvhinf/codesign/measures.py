@@ -50,9 +50,7 @@ def measure(design: Design, points: Array, *, progress: Progress = SILENT) -> Me
     for start in range(0, len(points), BATCH):
         for A, B, C, D in design.frozen(points[start : start + BATCH]):
             e, w1 = slice(0, n_rb), slice(0, n_rb)
-            peaks = [
-                hinf_norm(A, B[:, [k]], C[e], D[e][:, [k]]).norm for k in range(2 * n_rb, 2 * n_rb + n_flex)
-            ]
+            peaks = [hinf_norm(A, B[:, [k]], C[e], D[e][:, [k]]).norm for k in range(2 * n_rb, 2 * n_rb + n_flex)]
             controlled, rest = mode_damping(design, A)
             rows.append(
                 (

@@ -20,8 +20,8 @@ def log_gain_hessian(loop: ClosedLoop, omega: float, c: Complex, dK: Array, offs
               z = (L \Delta Q v,\; Q^* \Delta^T L^* u)
 
     with the cluster itself left out of the pseudo-inverse: its coupling is described by
-    the cuts. Where :math:`\omega` is a proper maximum of a single singular value the
-    curvature :math:`-\sigma_{\theta\omega} \sigma_{\omega\omega}^{-1} \sigma_{\omega\theta}` of the moving peak is added.
+    the cuts. Where :math:`\omega` is a proper maximum of a single singular value the curvature
+    :math:`-\sigma_{\theta\omega} \sigma_{\omega\omega}^{-1} \sigma_{\omega\theta}` of the moving peak is added.
 
     Parameters
     ----------

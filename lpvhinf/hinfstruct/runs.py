@@ -10,7 +10,8 @@ import numpy as np
 
 from lpvhinf.checks import Array
 from lpvhinf.hinfstruct.bundle import bundle
-from lpvhinf.hinfstruct.oracle import SMALLEST, Budget, ClosedLoops, NormOracle, Point
+from lpvhinf.hinfstruct.closed_loops import ClosedLoops
+from lpvhinf.hinfstruct.oracle import SMALLEST, Budget, NormOracle, Point
 from lpvhinf.hinfstruct.quasi_newton import bfgs
 from lpvhinf.hinfstruct.result import PhaseRecord
 from lpvhinf.hinfstruct.stabilise import AbscissaOracle, stabilise

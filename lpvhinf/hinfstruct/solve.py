@@ -14,7 +14,8 @@ from threadpoolctl import threadpool_limits
 
 from lpvhinf.checks import Array, finite_array, positive, read_only
 from lpvhinf.errors import DimensionError, DomainError, SynthesisError
-from lpvhinf.hinfstruct.oracle import SMALLEST, Budget, ClosedLoops, NormOracle
+from lpvhinf.hinfstruct.closed_loops import ClosedLoops
+from lpvhinf.hinfstruct.oracle import SMALLEST, Budget, NormOracle
 from lpvhinf.hinfstruct.result import HinfstructResult, PhaseRecord
 from lpvhinf.hinfstruct.runs import Outcome, Task, descend, polish
 from lpvhinf.hinfstruct.structures import ControllerStructure, realize_checked

@@ -9,8 +9,9 @@ import scipy.linalg
 
 from lpvhinf.checks import Array
 from lpvhinf.hinfstruct.bundle import bundle
+from lpvhinf.hinfstruct.closed_loops import ClosedLoops
 from lpvhinf.hinfstruct.loop import ClosedLoop
-from lpvhinf.hinfstruct.oracle import Budget, ClosedLoops, Cut, Point
+from lpvhinf.hinfstruct.oracle import Budget, Cut, Point
 from lpvhinf.hinfstruct.quasi_newton import Descent, bfgs
 from lpvhinf.hinfstruct.response import Complex
 

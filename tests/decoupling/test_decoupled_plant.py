@@ -133,7 +133,8 @@ def test_redundant_sensors_see_flexible_modes_only(mmpa: MMPA, decoupled_mmpa: D
 
 def test_redundant_rows_follow_sensors_whose_sensitivity_depends_on_p(small_modal: ModalModel) -> None:
     def uneven(points: Array) -> Array:
-        return small_modal.output_gains(points) * (1.0 + 3.0 * points[:, :, None] * np.array([[1.0], [-1.0], [0.5]]))
+        sensitivity = 1.0 + 3.0 * points[:, :, None] * np.array([[1.0], [-1.0], [0.5]])
+        return np.asarray(small_modal.output_gains(points) * sensitivity)
 
     plant = decouple(dataclasses.replace(small_modal, output_map=uneven), n_flex=1)
     points = everywhere(plant.box, 20)

@@ -37,6 +37,7 @@ def test_best_known_norm_is_reached(name: str) -> None:
     assert result.gamma <= 1.001 * best
 
 
+@pytest.mark.slow
 def test_a_norm_that_can_vanish() -> None:
     plant, _ = load("AC1")
-    assert hinfstruct(plant, StaticGain(plant.n_u, plant.n_y), starts=2).gamma < 1e-3
+    assert hinfstruct(plant, StaticGain(plant.n_u, plant.n_y), starts=6).gamma < 1e-3

@@ -7,9 +7,10 @@ import pytest
 
 from lpvhinf.checks import Array
 from lpvhinf.hinfstruct import BlockDiagonal, ControllerStructure, DiagonalGain, FixedOrder, Scaled, StaticGain
+from lpvhinf.hinfstruct.closed_loops import ClosedLoops
 from lpvhinf.hinfstruct.gradient import directions
 from lpvhinf.hinfstruct.loop import LoopFactory, augmented_gain
-from lpvhinf.hinfstruct.oracle import Budget, ClosedLoops, NormOracle
+from lpvhinf.hinfstruct.oracle import Budget, NormOracle
 from lpvhinf.hinfstruct.stabilise import AbscissaOracle
 from lpvhinf.statespace.generalized import GeneralizedPlant
 from tests.hinfstruct.plants import random_plant
