@@ -30,6 +30,7 @@ def codesign(
     positions: ArrayLike | None = None,
     n_positions: int = 13,
     warm_start: Design | ArrayLike | None = None,
+    rigid_start: ArrayLike | None = None,
     starts: int = 2,
     exchange_rounds: int = 2,
     exchange_tolerance: float = 0.01,
@@ -59,6 +60,8 @@ def codesign(
     warm_start : Design or (n_theta,), optional
         A conventional design gives K_RB to start an observer design from; one of the same architecture, or
         its parameters, are the start itself. Without it the conventional design is made first.
+    rigid_start : (n_parameters of K_RB,), optional
+        Parameters of K_RB that an observer design starts from, in place of a conventional design.
     starts : int
         Number of starts of the observer design: the best of a screening of Riccati gains and damping gains.
     exchange_rounds, exchange_tolerance, n_search
@@ -114,12 +117,12 @@ def codesign(
             checkpoint=checkpoint,
         )
 
-    if architecture == "output-observer" and warm_start is None:
+    if architecture == "output-observer" and warm_start is None and rigid_start is None:
         warm_start = codesign(
             decoupled, "rigid-body", spec, positions=active, exchange_rounds=0, n_search=1, seed=seed,
             max_iterations=max_iterations, tolerance=tolerance, time_limit=time_limit, progress=progress,
         )  # fmt: skip
-    initial = _initial(assembly, active, warm_start, starts)
+    initial = _initial(assembly, active, warm_start, rigid_start, starts)
     progress.stage(f"{architecture}: {len(active)} positions, {assembly.structure.n_parameters} parameters")
     result = solve(initial)
     for round_number in range(exchange_rounds + 1):
@@ -146,13 +149,21 @@ def codesign(
     )
 
 
-def _initial(assembly: Assembly, active: Array, warm_start: Design | ArrayLike | None, starts: int) -> list[Array]:
+def _initial(
+    assembly: Assembly,
+    active: Array,
+    warm_start: Design | ArrayLike | None,
+    rigid_start: ArrayLike | None,
+    starts: int,
+) -> list[Array]:
     """Starts of the solver, from what the caller has."""
-    if warm_start is None:
-        return [assembly.start(active)]
-    if not isinstance(warm_start, Design):
-        return [finite_array("warm_start", warm_start, (assembly.structure.n_parameters,))]
-    if warm_start.architecture == assembly.architecture:
+    if isinstance(warm_start, Design) and warm_start.architecture == assembly.architecture:
         return [np.asarray(warm_start.parameters)]
-    rigid = warm_start.assembly.split(warm_start.parameters)[0]
-    return observer_starts(assembly, active, rigid, starts)
+    if warm_start is not None and not isinstance(warm_start, Design):
+        return [finite_array("warm_start", warm_start, (assembly.structure.n_parameters,))]
+    if isinstance(warm_start, Design):
+        rigid_start = warm_start.assembly.split(warm_start.parameters)[0]
+    if rigid_start is None:
+        return [assembly.start(active)]
+    rigid = finite_array("rigid_start", rigid_start, (assembly.rigid_body.n_parameters,))
+    return [rigid] if assembly.observer is None else observer_starts(assembly, active, rigid, starts)

@@ -28,7 +28,9 @@ class Measures:
         Exact norm of S.
     flexible_peak : (N, n_flex)
         Exact norm of the process sensitivity from each flexible-mode input to e: 1 is the static output at the
-        position where the mode is best seen.
+        position where the mode is best seen. Its peak may be a discarded mode's, which u_FM excites as well.
+    mode_peak : (N, n_flex)
+        Largest gain of the same transfer within half an octave of the mode's own frequency.
     damping : (N, n_flex)
         Damping ratio of the pole that takes the largest part in each controlled mode.
     discarded_damping : (N,)
@@ -39,6 +41,7 @@ class Measures:
     crossover: Array
     sensitivity_peak: Array
     flexible_peak: Array
+    mode_peak: Array
     damping: Array
     discarded_damping: Array
 
@@ -50,13 +53,17 @@ def measure(design: Design, points: Array, *, progress: Progress = SILENT) -> Me
     for start in range(0, len(points), BATCH):
         for A, B, C, D in design.frozen(points[start : start + BATCH]):
             e, w1 = slice(0, n_rb), slice(0, n_rb)
-            peaks = [hinf_norm(A, B[:, [k]], C[e], D[e][:, [k]]).norm for k in range(2 * n_rb, 2 * n_rb + n_flex)]
+            w3 = range(2 * n_rb, 2 * n_rb + n_flex)
+            peaks = [hinf_norm(A, B[:, [k]], C[e], D[e][:, [k]]).norm for k in w3]
+            response = Response(A, B[:, 2 * n_rb :], C[e], D[e, 2 * n_rb :])
+            own = [peak_near(response, k, w) for k, w in enumerate(design.assembly.omega_flex)]
             controlled, rest = mode_damping(design, A)
             rows.append(
                 (
                     crossovers(design, A, B[:, w1], C[e], D[e, w1]),
                     hinf_norm(A, B[:, w1], C[e], D[e, w1]).norm,
                     np.array(peaks),
+                    np.array(own),
                     controlled,
                     rest,
                 )
@@ -68,9 +75,19 @@ def measure(design: Design, points: Array, *, progress: Progress = SILENT) -> Me
         crossover=np.array(columns[0]),
         sensitivity_peak=np.array(columns[1]),
         flexible_peak=np.array(columns[2]).reshape(len(points), n_flex),
-        damping=np.array(columns[3]).reshape(len(points), n_flex),
-        discarded_damping=np.array(columns[4]),
+        mode_peak=np.array(columns[3]).reshape(len(points), n_flex),
+        damping=np.array(columns[4]).reshape(len(points), n_flex),
+        discarded_damping=np.array(columns[5]),
     )
+
+
+def peak_near(response: Response, column: int, omega: float) -> float:
+    """Largest gain from one input within half an octave of omega [rad/s], on a grid that follows the poles."""
+    low, high = omega / np.sqrt(2.0), omega * np.sqrt(2.0)
+    poles = response.poles[(response.poles.imag > low) & (response.poles.imag < high)]
+    around = poles.imag[:, None] + np.abs(poles.real)[:, None] * np.linspace(-3.0, 3.0, 61)
+    grid = np.unique(np.clip(np.concatenate([np.geomspace(low, high, 200), around.ravel()]), low, high))
+    return float(np.max(np.linalg.norm(response.at(grid)[:, :, column], axis=1)))
 
 
 def crossovers(design: Design, A: Array, B: Array, C: Array, D: Array) -> Array:

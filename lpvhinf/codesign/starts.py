@@ -8,17 +8,21 @@ from lpvhinf.checks import Array
 from lpvhinf.codesign.assembly import Assembly
 from lpvhinf.codesign.positions import norms_at
 
-DAMPING = (0.1, 0.3, 1.0)
-SPREAD = 6  # positions at which a start is judged
+# From gentle to strong: a larger damping gain spills over into the discarded modes.
+DAMPING = (0.05, 0.1, 0.2, 0.4, 0.8)
+NOISE_RATIOS = (1.0, 10.0, 0.1, 0.01)
+JUDGES = 6  # positions at which a start is judged
+SAME = 0.05  # relative difference of norms that is no reason to take a stronger gain
 
 
 def observer_starts(assembly: Assembly, points: Array, rigid: Array, n: int) -> list[Array]:
     """The `n` best starts for given parameters of K_RB, judged at some of the positions.
 
-    Unstable ones rank last but still count: the solver stabilises them first.
+    Of starts that are equally good the gentlest comes first. Unstable ones rank last but still count: the
+    solver stabilises them first.
     """
-    few = points[np.linspace(0, len(points) - 1, min(SPREAD, len(points))).astype(int)]
-    tries = [assembly.start(points, rigid=rigid, xi=xi, noise_ratio=ratio)
-             for ratio in (10.0, 1.0, 0.1, 0.01) for xi in DAMPING]  # fmt: skip
-    scores = [float(np.max(norms_at(assembly, theta, few))) for theta in tries]
-    return [tries[i] for i in np.argsort(scores, kind="stable")[: max(1, n)]]
+    few = points[np.linspace(0, len(points) - 1, min(JUDGES, len(points))).astype(int)]
+    tries = [assembly.start(points, rigid=rigid, xi=xi, noise_ratio=ratio) for xi in DAMPING for ratio in NOISE_RATIOS]
+    scores = np.log([float(np.max(norms_at(assembly, theta, few))) for theta in tries])
+    rounded = np.where(np.isfinite(scores), np.round((scores - np.min(scores)) / SAME), np.inf)
+    return [tries[i] for i in np.argsort(rounded, kind="stable")[: max(1, n)]]

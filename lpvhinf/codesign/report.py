@@ -1,0 +1,67 @@
+"""The figures of a design, as numbers and as text."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from lpvhinf.codesign.design import Design
+from lpvhinf.codesign.measures import Measures
+
+AXES = ("x", "y", "z", "rx", "ry", "rz")
+
+
+def decibel(value: float) -> float:
+    """20 log10 of a gain."""
+    return float(20.0 * np.log10(value)) if value > 0.0 else -np.inf
+
+
+def figures(design: Design, measures: Measures) -> dict[str, Any]:
+    """The figures that a report quotes, for JSON: SI units but Hz, mm and dB where the name says so."""
+    worst = int(np.argmax(np.max(measures.flexible_peak, axis=1, initial=0.0)))
+    worst_own = int(np.argmax(np.max(measures.mode_peak, axis=1, initial=0.0)))
+    return {
+        "architecture": design.architecture,
+        "gamma": design.gamma,
+        "gamma_worst": design.gamma_worst,
+        "worst_position_mm": 1e3 * design.worst_position,
+        "n_positions": len(design.positions),
+        "optimality": design.optimality,
+        "status": design.status,
+        "seconds": design.seconds,
+        "crossover_min_Hz": np.min(measures.crossover, axis=0),
+        "crossover_max_Hz": np.max(measures.crossover, axis=0),
+        "crossover_mean_Hz": np.mean(measures.crossover, axis=0),
+        "sensitivity_peak_dB": decibel(float(np.max(measures.sensitivity_peak))),
+        "flexible_peak_dB": decibel(float(np.max(measures.flexible_peak, initial=0.0))),
+        "flexible_peak_position_mm": 1e3 * measures.points[worst],
+        "mode_peak_dB": decibel(float(np.max(measures.mode_peak, initial=0.0))),
+        "mode_peak_position_mm": 1e3 * measures.points[worst_own],
+        "damping_min": np.min(measures.damping, axis=0),
+        "damping_max": np.max(measures.damping, axis=0),
+        "discarded_damping_min": float(np.min(measures.discarded_damping)),
+        "K_RB": {name: getattr(design.K_RB, name) for name in ("gain", "f_i", "f_d", "f_lp", "zeta_lp")},
+        "xi": design.xi,
+        "controller_states": design.controller.n_x,
+    }
+
+
+def design_text(design: Design) -> str:
+    """A design in a few lines."""
+    K, f_bw = design.K_RB, design.assembly.scaling.f_bw
+    names = AXES if len(f_bw) == len(AXES) else tuple(f"axis {i + 1}" for i in range(len(f_bw)))
+    lines = [
+        f"{design.architecture} design for {np.unique(f_bw).tolist()} Hz at {len(design.positions)} positions",
+        f"  gamma            {design.gamma:.3f} at the design positions, {design.gamma_worst:.3f} over P (searched)",
+        f"  worst position   {(1e3 * design.worst_position).round(1).tolist()} mm",
+        "  axis   gain 1/s2   f_i Hz   f_d Hz  f_lp Hz  zeta_lp",
+    ]
+    for i, name in enumerate(names):
+        lines.append(
+            f"  {name:6s} {K.gain[i]:9.0f} {K.f_i[i]:8.2f} {K.f_d[i]:8.2f} {K.f_lp[i]:8.1f} {K.zeta_lp[i]:8.2f}"
+        )
+    if design.xi is not None:
+        pairs = zip(design.assembly.omega_flex, design.xi, strict=True)
+        lines += [f"  mode {w / (2 * np.pi):.1f} Hz: xi = {xi:.1f} 1/s" for w, xi in pairs]
+    return "\n".join(lines)

@@ -1,0 +1,1 @@
+"""Studies: what reproduces the paper's results. `python -m studies list` names them."""

@@ -1,0 +1,60 @@
+"""python -m studies list | run NAME [--preset tiny|paper|FILE.toml] [--out DIR] | report DIR."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from lpvhinf.cli.terminal import TerminalProgress
+from lpvhinf.errors import LpvHinfError
+from lpvhinf.storage import read_json
+from studies import output_observer
+from studies.output_observer_report import write_report
+from studies.settings import load_settings
+
+STUDIES = {output_observer.NAME: output_observer}
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    top = argparse.ArgumentParser(prog="python -m studies", description="Reproduce the studies of the project.")
+    commands = top.add_subparsers(dest="command", required=True)
+    commands.add_parser("list", help="name the studies and their presets")
+    run = commands.add_parser("run", help="run a study; finished designs in the folder are kept")
+    run.add_argument("name", choices=sorted(STUDIES))
+    run.add_argument("--preset", default="paper", help="tiny, paper, or the path of a .toml file")
+    run.add_argument("--out", type=Path, help="results folder, default results/NAME")
+    run.add_argument("--jobs", type=int, help="processes, default as in the preset")
+    report = commands.add_parser("report", help="write the report of a results folder anew")
+    report.add_argument("folder", type=Path)
+    return top
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run; the exit status is 0, 1 after an error of ours, 130 after an interrupt."""
+    arguments = parser().parse_args(argv)
+    try:
+        if arguments.command == "list":
+            for name, study in STUDIES.items():
+                print(f"{name}: {(study.__doc__ or '').splitlines()[0]}")
+        elif arguments.command == "run":
+            study = STUDIES[arguments.name]
+            settings = load_settings(study.Settings, arguments.name, arguments.preset, jobs=arguments.jobs)
+            with TerminalProgress() as progress:
+                study.run(settings, arguments.out or Path("results") / arguments.name, progress)
+        else:
+            read_json(arguments.folder / "settings.json")
+            write_report(arguments.folder)
+    except LpvHinfError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("interrupted: run the same command again to go on", file=sys.stderr)
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
