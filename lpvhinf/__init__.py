@@ -1,0 +1,43 @@
+"""Structured H-infinity and LPV design for motion systems whose flexible modes change with position.
+
+Examples
+--------
+>>> import lpvhinf as lh
+>>> plant = lh.mmpa.benchmark()
+>>> lh.decouple(plant, n_flex=1).n_modes
+21
+"""
+
+# Rooms whose function has the room's own name come first: importing the room binds the name to the module, the line
+# that follows binds it to the function, and nothing imports the room for the first time after that.
+from lpvhinf.codesign import codesign as codesign  # noqa: I001
+from lpvhinf.hinfstruct import hinfstruct as hinfstruct
+
+from lpvhinf.codesign import Design as Design
+from lpvhinf.codesign import Specification as Specification
+from lpvhinf.decoupling import DecoupledPlant as DecoupledPlant
+from lpvhinf.decoupling import decouple as decouple
+from lpvhinf.errors import AssumptionError as AssumptionError
+from lpvhinf.errors import DimensionError as DimensionError
+from lpvhinf.errors import DomainError as DomainError
+from lpvhinf.errors import LpvHinfError as LpvHinfError
+from lpvhinf.errors import LpvHinfWarning as LpvHinfWarning
+from lpvhinf.errors import StorageError as StorageError
+from lpvhinf.errors import SynthesisError as SynthesisError
+from lpvhinf.hinfstruct import BlockDiagonal as BlockDiagonal
+from lpvhinf.hinfstruct import ControllerStructure as ControllerStructure
+from lpvhinf.hinfstruct import DiagonalGain as DiagonalGain
+from lpvhinf.hinfstruct import FixedOrder as FixedOrder
+from lpvhinf.hinfstruct import HinfstructResult as HinfstructResult
+from lpvhinf.hinfstruct import StaticGain as StaticGain
+from lpvhinf.hinfstruct import hinf_norm as hinf_norm
+from lpvhinf.plant import MechanicalModel as MechanicalModel
+from lpvhinf.plant import ModalModel as ModalModel
+from lpvhinf.plant import mmpa as mmpa
+from lpvhinf.plant import modal_form as modal_form
+from lpvhinf.progress import Progress as Progress
+from lpvhinf.statespace import GeneralizedPlant as GeneralizedPlant
+from lpvhinf.statespace import LPVGeneralizedPlant as LPVGeneralizedPlant
+from lpvhinf.statespace import LPVStateSpace as LPVStateSpace
+
+__version__ = "0.1.0"

@@ -21,12 +21,15 @@ class NamedProgress(Progress):
         self.name, self.listener = name, listener
 
     def stage(self, name: str, total: int | None = None) -> None:
+        """Pass on a stage."""
         self.listener.stage(f"{self.name}: {name}", total)
 
     def update(self, advance: int = 1, **values: float) -> None:
+        """Pass on steps."""
         self.listener.update(advance, **values)
 
     def log(self, message: str) -> None:
+        """Pass on a message."""
         self.listener.log(f"{self.name}: {message}")
 
 
@@ -37,9 +40,11 @@ class QueuedProgress(Progress):
         self.name, self.channel = name, channel
 
     def stage(self, name: str, total: int | None = None) -> None:
+        """Pass on a stage."""
         self.channel.put(("stage", f"{self.name}: {name}"))
 
     def log(self, message: str) -> None:
+        """Pass on a message."""
         self.channel.put(("log", f"{self.name}: {message}"))
 
 

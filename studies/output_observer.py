@@ -130,7 +130,7 @@ def decoupled_plant(settings: Settings, job: Job) -> DecoupledPlant:
 
 
 def grid(box: Array, n: int) -> Array:
-    """n positions per axis, (n^n_p, n_p)."""
+    """A grid of n positions per axis, (n^n_p, n_p)."""
     axes = [np.linspace(low, high, n) for low, high in box]
     return np.stack([x.ravel() for x in np.meshgrid(*axes, indexing="ij")], axis=-1)
 

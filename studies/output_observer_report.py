@@ -55,13 +55,15 @@ def claims(designs: dict[str, Any]) -> list[dict[str, Any]]:
         {
             "claim": "flexible-mode process sensitivity at least 15 dB lower at the worst position, all frequencies",
             "quantity": "its norm, discarded modes included",
-            "value": f"{plain['flexible_peak_dB']:.1f} dB -> {observer['flexible_peak_dB']:.1f} dB: {overall:.1f} dB lower",
+            "value": f"{plain['flexible_peak_dB']:.1f} dB -> {observer['flexible_peak_dB']:.1f} dB: "
+            f"{overall:.1f} dB lower",
             "holds": overall >= PEAK_REDUCTION_DB,
         },
         {
             "claim": "all local loops stable on the dense grid",
             "quantity": f"largest real part of a pole over {observer['n_dense']} positions, plant model itself",
-            "value": f"conventional {plain['largest_real_part']:.2f}, observer {observer['largest_real_part']:.2f} rad/s",
+            "value": f"conventional {plain['largest_real_part']:.2f}, "
+            f"observer {observer['largest_real_part']:.2f} rad/s",
             "holds": not compared,
         },
     ]
@@ -130,17 +132,18 @@ def epsilon_table(designs: dict[str, Any]) -> list[str]:
     )
     reference = designs["conventional"]
     lines = [
-        "| epsilon | gamma | mode peak dB | lower by dB | damping % | crossover Hz (mean) | discarded, least damping % |",
+        "| epsilon | gamma | mode peak dB | lower by dB | damping % | crossover Hz (mean) "
+        "| discarded, least damping % |",
         "|---|---|---|---|---|---|---|",
     ]
-    for d in rows:
-        lines.append(
-            f"| {d['epsilon']:g} | {number(d['gamma'])} | {number(d['mode_peak_dB'], 1)} "
-            f"| {reference['mode_peak_dB'] - (d['mode_peak_dB'] or np.inf):.1f} "
-            f"| {100 * min(d['damping_min']):.1f}-{100 * max(d['damping_max']):.1f} "
-            f"| {np.mean([x for x in d['crossover_mean_Hz'] if x is not None]):.1f} "
-            f"| {100 * d['discarded_damping_min']:.2f} |"
-        )
+    lines += [
+        f"| {d['epsilon']:g} | {number(d['gamma'])} | {number(d['mode_peak_dB'], 1)} "
+        f"| {reference['mode_peak_dB'] - (d['mode_peak_dB'] or np.inf):.1f} "
+        f"| {100 * min(d['damping_min']):.1f}-{100 * max(d['damping_max']):.1f} "
+        f"| {np.mean([x for x in d['crossover_mean_Hz'] if x is not None]):.1f} "
+        f"| {100 * d['discarded_damping_min']:.2f} |"
+        for d in rows
+    ]
     return lines
 
 
@@ -155,9 +158,10 @@ def notes(designs: dict[str, Any]) -> list[str]:
     if literal is not None:
         out.append(
             "observer-Ty takes T_y of eq. 6 as the observer's only measurement. With the benchmark's four symmetric "
-            "z-beams the torsion mode then vanishes from the output at the centre and changes sign across P, so that no "
-            f"constant L sees it everywhere: gamma {number(literal['gamma'])}, {number(literal['gamma_worst'])} over P, "
-            f"against {number(designs['observer']['gamma'])} when the redundant readings stay available."
+            "z-beams the torsion mode then vanishes from the output at the centre and changes sign across P, so that "
+            f"no constant L sees it everywhere: gamma {number(literal['gamma'])}, "
+            f"{number(literal['gamma_worst'])} over P, against {number(designs['observer']['gamma'])} when the "
+            "redundant readings stay available."
         )
     unstable = [name for name, d in designs.items() if d["largest_real_part"] >= 0.0]
     if unstable:

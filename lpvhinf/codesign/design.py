@@ -119,7 +119,9 @@ class Design:
         if observer is not None:
             x, model = wiring.state("observer"), observer.model
             estimates = velocity_selection(n_rb, observer.n_flex) @ x
-            u_FM = -np.diag(tuned.xi) @ wiring.drive("band_pass", band_pass(observer.omega, observer.Q), estimates)
+            u_FM = -np.diag(np.asarray(tuned.xi)) @ wiring.drive(
+                "band_pass", band_pass(observer.omega, observer.Q), estimates
+            )
             u = wiring.stack(u_RB, u_FM)
             innovation = y - model.C @ x - model.D @ u
             gain = observer.injection[:, None] * np.asarray(tuned.L)

@@ -83,7 +83,8 @@ class Specification:
     def from_mapping(cls, settings: dict[str, Any]) -> Specification:
         """From settings as read from a file; an unknown one is an error that lists the known ones."""
         known_options("Specification", settings, (field.name for field in dataclasses.fields(cls)))
-        return cls(**{key: tuple(value) if isinstance(value, list) else value for key, value in settings.items()})
+        values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in settings.items()}
+        return cls(**values)
 
     def bandwidths(self, n_rb: int) -> Array:
         """f_bw of every axis, (n_rb,) [Hz]."""

@@ -1,4 +1,4 @@
-"""Starts of an observer design: Riccati gains and damping gains, screened by their exact norms."""
+"""Starts of a design: rules of thumb for K_RB; for an observer Riccati and damping gains, screened by exact norms."""
 
 from __future__ import annotations
 
@@ -13,6 +13,12 @@ DAMPING = (0.05, 0.1, 0.2, 0.4, 0.8)
 NOISE_RATIOS = (1.0, 10.0, 0.1, 0.01)
 JUDGES = 6  # positions at which a start is judged
 SAME = 0.05  # relative difference of norms that is no reason to take a stronger gain
+
+
+def rigid_starts(assembly: Assembly, n: int) -> list[Array]:
+    """`n` starts of K_RB: rules of thumb for the target bandwidth, and for lower ones."""
+    structure, f_bw = assembly.rigid_body, assembly.scaling.f_bw
+    return [structure.parameters(structure.rule_of_thumb(f_bw * 0.8**k)) for k in range(max(1, n))]
 
 
 def observer_starts(assembly: Assembly, points: Array, rigid: Array, n: int) -> list[Array]:

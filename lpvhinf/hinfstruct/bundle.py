@@ -35,7 +35,7 @@ def quadratic_model(values: Array, G: Array, hard: NDArray[np.bool_], B: Array, 
     B : (n, n) positive semidefinite
     radius : float
     """
-    m, n = G.shape
+    n = G.shape[1]
     # unit-sized variables d / radius; hard rows to unit size
     size = np.where(hard, np.maximum(np.linalg.norm(G, axis=1) * radius, np.abs(values)), 1.0)
     size = np.where(size > 0.0, size, 1.0)

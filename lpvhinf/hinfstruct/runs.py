@@ -22,8 +22,8 @@ from lpvhinf.statespace.generalized import GeneralizedPlant
 DRAWS = 4
 #: Guard mu against infinite gains, in the first descent of every other random start.
 GUARD = 0.02
-#: Relative decrease of the norm in 15 iterations below which a descent goes over to the next, then to the polish.
-DESCENT = (3e-2, 1e-2)
+#: A first descent ends this much earlier than the second one.
+EARLIER = 3.0
 
 Listener = Callable[[str, Array, float], None]
 
@@ -41,6 +41,7 @@ class Task:
     seconds: float
     max_iterations: int
     tolerance: float
+    descent_tolerance: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -115,7 +116,7 @@ def descend(task: Task, listen: Listener | None = None) -> Outcome:
     theta, gamma = best.theta, np.inf
     # every other random start is kept from infinite gains at first: both ways find minima that the other misses
     guards = (GUARD if task.theta is None and task.start % 2 == 0 else 0.0, 0.0)
-    for guard, tolerance in zip(guards, DESCENT, strict=True):
+    for guard, tolerance in zip(guards, (EARLIER * task.descent_tolerance, task.descent_tolerance), strict=True):
         # the logarithm at first, then about linear in the norm
         offset = gamma if np.isfinite(gamma) else 0.0
         oracle = NormOracle(loops, budget, guard=guard, offset=offset)

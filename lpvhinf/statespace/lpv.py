@@ -189,14 +189,33 @@ class LPVStateSpace:
         return LPVStateSpace(*(m.derivative(axis) for m in self.matrices))
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the coefficients and the box to an .npz file, atomically."""
-        write_arrays(path, KIND, {"box": self.box, **{n: m.coefficients for n, m in self._named()}})
+        """Write the system to an .npz file, atomically: "box", and for each matrix M of A, B, C, D three arrays.
+
+        "M_shape" is (k_1, ..., k_np, rows, cols); "M_entries" names the entries of the flattened (rows, cols) matrix
+        that are not zero for all p, and "M_coefficients" (k_1 ... k_np, n_entries) holds their Chebyshev coefficients.
+        """
+        arrays: dict[str, Any] = {"box": self.box}
+        for name, matrix in self._named():
+            flat = matrix.coefficients.reshape(-1, matrix.shape[0] * matrix.shape[1])
+            entries = np.flatnonzero(np.any(flat != 0.0, axis=0))
+            arrays |= {
+                f"{name}_shape": np.array(matrix.coefficients.shape),
+                f"{name}_entries": entries,
+                f"{name}_coefficients": flat[:, entries],
+            }
+        write_arrays(path, KIND, arrays)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> LPVStateSpace:
         """Read what `save` wrote; a `StorageError` if the file is damaged or of another kind."""
         data = read_arrays(path, KIND)
-        return cls(*(ChebyshevMatrix(data[name], data["box"]) for name in "ABCD"))
+        matrices = []
+        for name in "ABCD":
+            shape = tuple(int(n) for n in data[f"{name}_shape"])
+            flat = np.zeros((int(np.prod(shape[:-2])), shape[-2] * shape[-1]))
+            flat[:, data[f"{name}_entries"]] = data[f"{name}_coefficients"]
+            matrices.append(ChebyshevMatrix(flat.reshape(shape), data["box"]))
+        return cls(*matrices)
 
     def _named(self) -> list[tuple[str, ChebyshevMatrix]]:
         return list(zip("ABCD", self.matrices, strict=True))
