@@ -17,7 +17,6 @@ from lpvhinf.polynomial import ChebyshevMatrix
 from lpvhinf.problems import Loop, ObserverBranch, TunedParts, four_block, six_block
 from lpvhinf.shaping import Scaling, ShapingFilters, pade_delay, scaling
 from lpvhinf.statespace.generalized import GeneralizedPlant
-from lpvhinf.statespace.interconnect import series
 from lpvhinf.statespace.lpv import LPVStateSpace
 from lpvhinf.statespace.lpv_generalized import LPVGeneralizedPlant
 
@@ -97,7 +96,7 @@ class Assembly:
         plant = self.scaling.apply(system)
         if self.specification.delay > 0.0:
             delay = pade_delay(self.specification.delay, self.specification.delay_order, self.plant.n_out)
-            plant = series(plant, LPVStateSpace.from_system(delay, plant.box))
+            plant = plant.series(LPVStateSpace.from_system(delay, plant.box))
         return Loop(plant=plant, filters=self.filters, n_rb=self.plant.n_rb, observer=observer)
 
     def problem(self, loop: Loop) -> LPVGeneralizedPlant:

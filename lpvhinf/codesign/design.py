@@ -19,6 +19,7 @@ from lpvhinf.statespace.lpv import LPVStateSpace
 from lpvhinf.storage import write_arrays
 
 KIND = "lpvhinf.Design"
+AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -197,9 +198,22 @@ class Design:
 
     def report(self) -> str:
         """The design in a few lines of text."""
-        from lpvhinf.codesign.report import design_text
-
-        return design_text(self)
+        K, f_bw = self.K_RB, self.assembly.scaling.f_bw
+        names = AXES if len(f_bw) == len(AXES) else tuple(f"axis {i + 1}" for i in range(len(f_bw)))
+        lines = [
+            f"{self.architecture} design for {np.unique(f_bw).tolist()} Hz at {len(self.positions)} positions",
+            f"  gamma            {self.gamma:.3f} at the design positions, {self.gamma_worst:.3f} over P (searched)",
+            f"  worst position   {(1e3 * self.worst_position).round(1).tolist()} mm",
+            "  axis   gain 1/s2   f_i Hz   f_d Hz  f_lp Hz  zeta_lp",
+        ]
+        for i, name in enumerate(names):
+            lines.append(
+                f"  {name:6s} {K.gain[i]:9.0f} {K.f_i[i]:8.2f} {K.f_d[i]:8.2f} {K.f_lp[i]:8.1f} {K.zeta_lp[i]:8.2f}"
+            )
+        if self.xi is not None:
+            pairs = zip(self.assembly.omega_flex, self.xi, strict=True)
+            lines += [f"  mode {w / (2 * np.pi):.1f} Hz: xi = {xi:.1f} 1/s" for w, xi in pairs]
+        return "\n".join(lines)
 
     def __repr__(self) -> str:
         return f"Design({self.architecture!r}, gamma={self.gamma:.4g}, gamma_worst={self.gamma_worst:.4g})"

@@ -1,4 +1,4 @@
-"""The figures of a design, as numbers and as text."""
+"""The figures of a design that reports quote."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ import numpy as np
 
 from lpvhinf.codesign.design import Design
 from lpvhinf.codesign.measures import Measures
-
-AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
 def decibel(value: float) -> float:
@@ -45,23 +43,3 @@ def figures(design: Design, measures: Measures) -> dict[str, Any]:
         "xi": design.xi,
         "controller_states": design.controller.n_x,
     }
-
-
-def design_text(design: Design) -> str:
-    """A design in a few lines."""
-    K, f_bw = design.K_RB, design.assembly.scaling.f_bw
-    names = AXES if len(f_bw) == len(AXES) else tuple(f"axis {i + 1}" for i in range(len(f_bw)))
-    lines = [
-        f"{design.architecture} design for {np.unique(f_bw).tolist()} Hz at {len(design.positions)} positions",
-        f"  gamma            {design.gamma:.3f} at the design positions, {design.gamma_worst:.3f} over P (searched)",
-        f"  worst position   {(1e3 * design.worst_position).round(1).tolist()} mm",
-        "  axis   gain 1/s2   f_i Hz   f_d Hz  f_lp Hz  zeta_lp",
-    ]
-    for i, name in enumerate(names):
-        lines.append(
-            f"  {name:6s} {K.gain[i]:9.0f} {K.f_i[i]:8.2f} {K.f_d[i]:8.2f} {K.f_lp[i]:8.1f} {K.zeta_lp[i]:8.2f}"
-        )
-    if design.xi is not None:
-        pairs = zip(design.assembly.omega_flex, design.xi, strict=True)
-        lines += [f"  mode {w / (2 * np.pi):.1f} Hz: xi = {xi:.1f} 1/s" for w, xi in pairs]
-    return "\n".join(lines)

@@ -14,6 +14,8 @@ from lpvhinf.checks import Array, box_array
 from lpvhinf.errors import DimensionError, DomainError
 from lpvhinf.fitting import MatrixFit, interpolate, least_squares
 from lpvhinf.polynomial import ChebyshevMatrix, power_to_chebyshev
+from lpvhinf.statespace import interconnect
+from lpvhinf.statespace.interconnect import Matrices
 from lpvhinf.statespace.interop import state_space_matrices
 from lpvhinf.storage import read_arrays, write_arrays
 
@@ -175,9 +177,9 @@ class LPVStateSpace:
         return control.ss(*(m.at(p) for m in self.matrices), remove_useless_states=False)
 
     @property
-    def matrices(self) -> tuple[ChebyshevMatrix, ChebyshevMatrix, ChebyshevMatrix, ChebyshevMatrix]:
+    def matrices(self) -> Matrices:
         """(A, B, C, D)."""
-        return self.A, self.B, self.C, self.D
+        return Matrices(self.A, self.B, self.C, self.D)
 
     def sample(self, points: ArrayLike) -> tuple[Array, Array, Array, Array]:
         """(A, B, C, D) at positions (N, n_p), stacked as (N, rows, cols); constants are broadcast views."""
@@ -220,31 +222,25 @@ class LPVStateSpace:
     def _named(self) -> list[tuple[str, ChebyshevMatrix]]:
         return list(zip("ABCD", self.matrices, strict=True))
 
-    # interconnections live in interconnect.py; here they are only reachable by their usual names
-
     def series(self, after: LPVStateSpace) -> LPVStateSpace:
         """`after` following this system: y = after(self(u))."""
-        from lpvhinf.statespace import interconnect
+        return LPVStateSpace(*interconnect.series(self.matrices, after.matrices))
 
-        return interconnect.series(self, after)
+    def append(self, other: LPVStateSpace) -> LPVStateSpace:
+        """Both systems side by side: diag(self, other)."""
+        return LPVStateSpace(*interconnect.append(self.matrices, other.matrices))
 
     def parallel(self, other: LPVStateSpace) -> LPVStateSpace:
         """The sum of two systems with the same inputs and outputs."""
-        from lpvhinf.statespace import interconnect
-
-        return interconnect.parallel(self, other)
+        return LPVStateSpace(*interconnect.parallel(self.matrices, other.matrices))
 
     def feedback(self, other: LPVStateSpace, sign: int = -1) -> LPVStateSpace:
         """The loop u = r + sign * other(y), from r to y."""
-        from lpvhinf.statespace import interconnect
-
-        return interconnect.feedback(self, other, sign)
+        return LPVStateSpace(*interconnect.feedback(self.matrices, other.matrices, sign))
 
     def lft(self, controller: LPVStateSpace) -> LPVStateSpace:
         """The lower linear fractional transformation: last outputs to `controller`, its outputs to the last inputs."""
-        from lpvhinf.statespace import interconnect
-
-        return interconnect.lft(self, controller)
+        return LPVStateSpace(*interconnect.lft(self.matrices, controller.matrices))
 
     def __repr__(self) -> str:
         degree = tuple(max(d) for d in zip(*(m.degree for m in self.matrices), strict=True))

@@ -1,0 +1,63 @@
+"""The console script `lpvhinf`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+
+import lpvhinf
+from lpvhinf.cli.terminal import TerminalProgress
+from lpvhinf.errors import DomainError, LpvHinfError
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    top = argparse.ArgumentParser(prog="lpvhinf", description="Structured H-infinity design for motion systems.")
+    top.add_argument("--version", action="version", version=f"lpvhinf {lpvhinf.__version__}")
+    commands = top.add_subparsers(dest="command", required=True)
+    design = commands.add_parser("design", help="design a controller for the planar actuator benchmark")
+    design.add_argument("settings", nargs="?", type=Path, help="TOML file with settings of lpvhinf.Specification")
+    design.add_argument("--architecture", default="output-observer", choices=["rigid-body", "output-observer"])
+    design.add_argument("--n-flex", type=int, default=1, help="controlled flexible modes")
+    design.add_argument("--plant-modes", type=int, default=15, help="flexible modes of the plant model")
+    design.add_argument("--out", type=Path, required=True, help="folder for the design's arrays")
+    return top
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run; the exit status is 0, 1 after an error of ours, 130 after an interrupt."""
+    arguments = parser().parse_args(argv)
+    try:
+        specification = read_specification(arguments.settings)
+        plant = lpvhinf.decouple(lpvhinf.mmpa.benchmark(n_flex=arguments.plant_modes), n_flex=arguments.n_flex)
+        with TerminalProgress() as progress:
+            design = lpvhinf.codesign(plant, arguments.architecture, specification, progress=progress)
+        design.save(arguments.out)
+        print(design.report())
+    except LpvHinfError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("interrupted: nothing was written", file=sys.stderr)
+        return 130
+    return 0
+
+
+def read_specification(path: Path | None) -> lpvhinf.Specification:
+    """The specification in a TOML file, or the default one.
+
+    Raises
+    ------
+    DomainError
+        If the file is missing, is not TOML, or holds an unknown setting.
+    """
+    if path is None:
+        return lpvhinf.Specification()
+    try:
+        values = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, tomllib.TOMLDecodeError) as error:
+        raise DomainError(f"settings {path} cannot be read as TOML: {error}.") from error
+    return lpvhinf.Specification.from_mapping(values)
