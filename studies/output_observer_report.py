@@ -108,13 +108,13 @@ def markdown(report: dict[str, Any]) -> str:
 def table(designs: dict[str, Any]) -> list[str]:
     """One row a design."""
     lines = [
-        "| design | gamma | over P | crossover Hz (min-max) | peak of S dB | mode peak dB | flexible peak dB "
-        "| damping % | discarded modes, least damping % | largest Re rad/s |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        "| design | gamma | over P | worst at mm | crossover Hz (min-max) | peak of S dB | mode peak dB "
+        "| flexible peak dB | damping % | discarded modes, least damping % | largest Re rad/s |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for name, d in designs.items():
         lines.append(
-            f"| {name} | {number(d['gamma'])} | {number(d['gamma_worst'])} "
+            f"| {name} | {number(d['gamma'])} | {number(d['gamma_worst'])} | {place(d['worst_position_mm'])} "
             f"| {number(min_of(d['crossover_min_Hz']), 1)}-{number(max_of(d['crossover_max_Hz']), 1)} "
             f"| {number(d['sensitivity_peak_dB'], 1)} | {number(d['mode_peak_dB'], 1)} "
             f"| {number(d['flexible_peak_dB'], 1)} "
@@ -174,6 +174,11 @@ def notes(designs: dict[str, Any]) -> list[str]:
 def number(value: float | None, digits: int = 3) -> str:
     """A figure; what JSON could not hold was infinite."""
     return "unbounded" if value is None else f"{value:.{digits}f}"
+
+
+def place(position: list[float]) -> str:
+    """A position in mm."""
+    return ", ".join(f"{x:.0f}" for x in position)
 
 
 def min_of(values: list[float | None]) -> float | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -76,3 +78,18 @@ def small_plant(small_modal: ModalModel) -> DecoupledPlant:
 def small_positions() -> Array:
     """Positions of the small plant: ends, centre and others."""
     return LENGTH * np.array([[-0.5], [0.0], [0.5], [0.123], [-0.317]])
+
+
+@pytest.fixture(scope="session")
+def tiny_results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The results folder of the study output_observer, preset tiny: most of a minute, once a session.
+
+    Tests that use it belong to the group "tiny", so that one worker alone runs the study.
+    """
+    from lpvhinf.progress import SILENT
+    from studies import output_observer
+    from studies.settings import load_settings
+
+    folder = tmp_path_factory.mktemp("tiny")
+    output_observer.run(load_settings(output_observer.Settings, output_observer.NAME, "tiny"), folder, SILENT)
+    return folder

@@ -109,10 +109,10 @@ def codesign(
         else points_in_box(positions, decoupled.box, name="positions")
     )
 
-    def solve(initial: list[Array]) -> HinfstructResult:
+    def solve(initial: list[Array], passes: int) -> HinfstructResult:
         plants = assembly.generalized_plants(active)
         best: HinfstructResult | None = None
-        for _ in range(MAX_PASSES):
+        for _ in range(passes):
             result = hinfstruct(
                 plants,
                 assembly.structure,
@@ -140,7 +140,7 @@ def codesign(
         )  # fmt: skip
     initial = _initial(assembly, active, warm_start, rigid_start, starts)
     progress.stage(f"{architecture}: {len(active)} positions, {assembly.structure.n_parameters} parameters")
-    result = solve(initial)
+    result = solve(initial, MAX_PASSES)
     for round_number in range(exchange_rounds + 1):
         progress.stage(f"{architecture}: worst position over P")
         worst = worst_position(assembly, result.parameters, n_search=n_search, seed=seed + 1)
@@ -149,7 +149,7 @@ def codesign(
         if len(new) == 0 or round_number == exchange_rounds:
             break
         active = np.vstack([active, new])
-        result = solve([np.asarray(result.parameters)])
+        result = solve([np.asarray(result.parameters)], 1)
     gammas = norms_at(assembly, result.parameters, active)
     beyond = worst.gamma > np.max(gammas)
     return Design(

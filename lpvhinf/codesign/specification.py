@@ -60,7 +60,7 @@ class Specification:
     alpha: float = 20.0
     K_s: float = 0.5
     K_r: float = 0.5
-    epsilon: Number = 0.03
+    epsilon: Number = 0.1
     beta_1: float = 0.5
     beta_2: float = 0.05
     Q: float = 1.0
