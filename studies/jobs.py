@@ -63,12 +63,19 @@ def run_jobs(
         futures: list[Future[R]] = [
             pool.submit(work, *arguments, QueuedProgress(name, channel)) for name, arguments in tasks
         ]
-        waiting = set(futures)
-        while waiting:
-            done, waiting = wait(waiting, timeout=0.5)
-            _forward(channel, progress)
-            for future in done:
-                future.result()  # an error of a job ends the run at once; finished jobs are on disk
+        try:
+            waiting = set(futures)
+            while waiting:
+                done, waiting = wait(waiting, timeout=0.5)
+                _forward(channel, progress)
+                for future in done:
+                    future.result()  # an error of a job ends the run at once; finished jobs are on disk
+        except BaseException:
+            # nobody waits for the others any more: they have checkpoints, and would otherwise go on for minutes
+            pool.shutdown(wait=False, cancel_futures=True)
+            for worker in multiprocessing.active_children():
+                worker.terminate()
+            raise
         _forward(channel, progress)
         return [future.result() for future in futures]
 

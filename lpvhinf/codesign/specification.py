@@ -74,8 +74,10 @@ class Specification:
             value = getattr(self, name)
             if value is not None and np.any(finite_array(name, value) <= 0.0):
                 raise DomainError(f"{name} is {value}, wanted values above 0.")
-        if not (np.isfinite(self.delay) and self.delay >= 0.0):
-            raise DomainError(f"delay is {self.delay}, wanted a finite number of seconds, 0 or more.")
+        if finite_array("delay", self.delay, ()) < 0.0:
+            raise DomainError(f"delay is {self.delay}, wanted 0 or more seconds.")
+        if not isinstance(self.delay_order, int) or self.delay_order < 1:
+            raise DomainError(f"delay_order is {self.delay_order!r}, wanted a whole number of at least 1.")
         if self.beta_1 <= self.beta_2:
             raise DomainError(f"beta_1 = {self.beta_1}, beta_2 = {self.beta_2}; wanted beta_1 > beta_2.")
 

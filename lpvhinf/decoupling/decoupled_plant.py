@@ -278,9 +278,14 @@ def decouple(
         If there are too few actuators or sensors, a preserved mode is not observable at any position, or
         the decoupling does not hold to 1e-10.
     """
-    modal = plant if isinstance(plant, ModalModel) else plant.modal
-    if weight is None and not isinstance(plant, ModalModel):
-        weight = plant.coil_weights
+    modal = plant if isinstance(plant, ModalModel) else getattr(plant, "modal", None)
+    if not isinstance(modal, ModalModel):
+        raise DomainError(
+            f"plant is a {type(plant).__name__}, wanted a ModalModel or an object with one as `.modal`. "
+            "Use modal_form on a MechanicalModel first."
+        )
+    if weight is None:
+        weight = getattr(plant, "coil_weights", None)
     if actuation != "over":
         raise DomainError(f"actuation is {actuation!r}, wanted 'over': more actuators than decoupled modes.")
     if input_decoupling not in ("extended", "rigid-body"):

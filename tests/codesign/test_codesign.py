@@ -49,14 +49,20 @@ def test_gamma_is_the_peak_of_the_formula(rigid: Design) -> None:
     assert rigid.stabilizing
     peaks = []
     for p in rigid.positions:
-        grid = np.unique(np.concatenate([HERTZ, *(w * np.linspace(0.97, 1.03, 61) for w in (60.0, 110.0, 240.0))]))
+        grid = np.unique(
+            np.concatenate([[1e-3], HERTZ, *(w * np.linspace(0.97, 1.03, 61) for w in (60.0, 110.0, 240.0))])
+        )
         values = np.array([four_block(rigid, p, 2 * np.pi * f) for f in grid])
         best = int(np.argmax(values))
-        around = (grid[best - 1], grid[best + 1])
+        around = (grid[max(0, best - 1)], grid[min(best + 1, len(grid) - 1)])
         fine = scipy.optimize.minimize_scalar(
-            lambda f, p=p: -four_block(rigid, p, 2 * np.pi * f), bounds=around, method="bounded", options={"xatol": 1e-9}
+            lambda f, p=p: -four_block(rigid, p, 2 * np.pi * f),
+            bounds=around,
+            method="bounded",
+            options={"xatol": 1e-9},
         )
         peaks.append(max(values[best], -fine.fun))
+    print(np.array(peaks)/rigid.gammas-1, grid[best], peaks, [four_block(rigid, rigid.positions[0], 2*np.pi*f) for f in (1e-4,1e-3,.01,.1,1.)])
     assert peaks == pytest.approx(rigid.gammas, rel=1e-6)
     assert rigid.gamma == np.max(rigid.gammas) <= rigid.gamma_worst
 
@@ -100,8 +106,8 @@ def test_the_controller_has_the_gains_that_are_read(name: str, request: pytest.F
     K = design.K_RB.response(2 * np.pi * HERTZ)
     for i in range(2):
         assert np.max(np.abs(response[i, i] / K[:, i] - 1.0)) < 1e-9
-        assert not np.any(response[i, 1 - i])
-    assert not np.any(frozen(2j * np.pi * HERTZ)[:2, 2:])  # u_RB knows y by e alone
+        assert np.max(np.abs(response[i, 1 - i])) < 1e-9 * np.max(np.abs(K[:, i]))
+    assert np.max(np.abs(frozen(2j * np.pi * HERTZ)[:2, 2:])) < 1e-9 * np.max(np.abs(K))  # u_RB knows y by e alone
     assert frozen.nstates == (6 if name == "rigid" else 14)
 
 
@@ -171,8 +177,12 @@ def test_gains_are_round_tripped(rigid: Design) -> None:
         ({"positions": [[0.0], [0.2]]}, DomainError, r"positions = \[0\.2\] is outside the box"),
         ({"positions": [[0.0, 0.0]]}, DimensionError, "positions has shape"),
         ({"positions": [[np.nan]]}, DomainError, r"positions\[0, 0\] is nan"),
-        ({"warm_start": np.zeros(29)}, DimensionError, r"warm_start has shape \(29,\), wanted \(29|warm_start has shape"),
-        ({"warm_start": np.full(10, np.nan)}, LpvHinfError, "warm_start"),
+        (
+            {"warm_start": np.zeros(29)},
+            DimensionError,
+            r"warm_start has shape \(29,\), wanted \(29|warm_start has shape",
+        ),
+        ({"warm_start": np.full(10, np.nan)}, DomainError, r"warm_start\[0\] is nan"),
         ({"rigid_start": np.zeros(9)}, DimensionError, r"rigid_start has shape \(9,\), wanted \(10\)"),
         ({"rigid_start": np.full(10, np.inf)}, DomainError, r"rigid_start\[0\] is inf"),
         ({"max_iterations": 0}, DomainError, "max_iterations is 0"),

@@ -74,7 +74,10 @@ def test_invalid_values(name: str, value: Any) -> None:
         Specification(**{name: value})
 
 
-@pytest.mark.parametrize("wrong", [{"delay": -1e-4}, {"delay": np.nan}, {"beta_2": 0.0}, {"f_bw": [40.0, 0.0]}])
+@pytest.mark.parametrize(
+    "wrong",
+    [{"delay": -1e-4}, {"delay": np.nan}, {"delay": "x"}, {"delay_order": 0}, {"beta_2": 0.0}, {"f_bw": [40.0, 0.0]}],
+)
 def test_other_invalid_values(wrong: dict[str, Any]) -> None:
     with pytest.raises(DomainError, match=next(iter(wrong))):
         Specification(**wrong)

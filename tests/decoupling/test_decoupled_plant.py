@@ -226,3 +226,8 @@ def test_all_and_no_flexible_modes(small_modal: ModalModel) -> None:
         assert plant.system.n_u == 2 + n_flex
         assert plant.frozen(points)[0].n_x == 10
         assert max(plant.verify(points).rigid_body, plant.verify(points).preserved_excitation) < 1e-10
+
+
+def test_a_plant_without_modal_form_is_refused() -> None:
+    with pytest.raises(DomainError, match="modal_form"):
+        decouple(object())

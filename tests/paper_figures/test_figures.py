@@ -154,7 +154,9 @@ def test_six_axes_with_bounds(drawn: tuple[Figure, Any]) -> None:
     assert len({ax.get_title() for ax in axes.ravel()}) == 6
 
 
-@pytest.mark.parametrize(("label", "role", "height"), [("first", "rigid-body", 3.0), ("second", "output-observer", 0.5)])
+@pytest.mark.parametrize(
+    ("label", "role", "height"), [("first", "rigid-body", 3.0), ("second", "output-observer", 0.5)]
+)
 def test_the_line_is_the_worst_position(drawn: tuple[Figure, Any], label: str, role: str, height: float) -> None:
     for ax, bound in zip(drawn[1].ravel(), BOUND.reshape(6, 40), strict=True):
         curve = line(ax, label)

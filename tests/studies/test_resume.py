@@ -166,9 +166,7 @@ def test_the_checkpoint_of_other_settings_is_not_used(tmp_path: Path, asked: dic
 
 
 @pytest.mark.parametrize("damage", [b"", b"not an archive", b"PK\x03\x04 cut off"])
-def test_a_damaged_checkpoint_is_reported_and_not_used(
-    tmp_path: Path, asked: dict[str, Any], damage: bytes
-) -> None:
+def test_a_damaged_checkpoint_is_reported_and_not_used(tmp_path: Path, asked: dict[str, Any], damage: bytes) -> None:
     path = checkpoint(tmp_path, SMALLEST, CONVENTIONAL, np.zeros(30))
     path.write_bytes(damage)
     listener = Recorder()
