@@ -35,10 +35,10 @@ reproduce: $(READY) ## the paper's main study and its figures, in results/ (resu
 reproduce-all: reproduce bench ## the above and the benchmarks
 
 test: $(READY) ## the tests of a few minutes
-	$(PY) -m pytest -n $(JOBS) --dist loadgroup -m "not slow"
+	$(PY) -m pytest -n $(JOBS) --dist loadfile -m "not slow"
 
 test-all: $(READY) ## every test, also the long ones
-	$(PY) -m pytest -n $(JOBS) --dist loadgroup -m "slow or not slow"
+	$(PY) -m pytest -n $(JOBS) --dist loadfile -m "slow or not slow"
 
 lint: $(READY) ## style, format and types
 	$(PY) -m ruff check .

@@ -106,3 +106,10 @@ def known_options(what: str, given: Iterable[str], known: Iterable[str]) -> None
     for name in given:
         if name not in names:
             raise DomainError(f"{what} has no option {name!r}. Known: {', '.join(names)}.")
+
+
+def whole_number(name: str, value: object, least: int) -> int:
+    """`value` if it is a whole number of at least `least`, else a `DomainError`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise DomainError(f"{name} is {value!r}, wanted a whole number of at least {least}.")
+    return int(value)

@@ -15,7 +15,8 @@ NAME = "damping_trade"
 
 def make(results: Path, out: Path) -> list[Path]:
     """Draw the figure from the summaries in a results folder of the study output_observer."""
-    summaries = [read_json(path) for path in sorted(results.glob("designs/*/summary.json"))]
+    names = read_json(results / "designs.json")
+    summaries = [read_json(results / "designs" / name / "summary.json") for name in names]
     observers = sorted(
         (s for s in summaries if s["architecture"] == "output-observer" and s["sensing"] == "all"),
         key=lambda s: s["epsilon"],

@@ -58,6 +58,7 @@ def run_jobs(
     for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
     context = multiprocessing.get_context("spawn")
+    others = set(multiprocessing.active_children())
     with context.Manager() as manager, ProcessPoolExecutor(min(jobs, len(tasks)), mp_context=context) as pool:
         channel = manager.Queue()
         futures: list[Future[R]] = [
@@ -73,7 +74,7 @@ def run_jobs(
         except BaseException:
             # nobody waits for the others any more: they have checkpoints, and would otherwise go on for minutes
             pool.shutdown(wait=False, cancel_futures=True)
-            for worker in multiprocessing.active_children():
+            for worker in set(multiprocessing.active_children()) - others:
                 worker.terminate()
             raise
         _forward(channel, progress)

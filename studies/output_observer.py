@@ -12,7 +12,6 @@ Each design ends as a folder of arrays; the report and the figures are made from
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import time
 from dataclasses import dataclass
@@ -21,7 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from lpvhinf.checks import Array, finite_array, positive
+import lpvhinf
+from lpvhinf.checks import Array, finite_array, positive, whole_number
 from lpvhinf.codesign import Design, Specification, codesign, largest_real_part, measure
 from lpvhinf.codesign.measures import block_responses, bounds
 from lpvhinf.codesign.report import figures
@@ -29,13 +29,15 @@ from lpvhinf.decoupling import DecoupledPlant, decouple
 from lpvhinf.errors import DomainError, StorageError
 from lpvhinf.plant.mmpa import benchmark
 from lpvhinf.progress import Progress
-from lpvhinf.storage import read_arrays, read_json, write_arrays, write_json
+from lpvhinf.statespace import LPVStateSpace
+from lpvhinf.storage import make_folder, read_arrays, read_json, write_arrays, write_json
 from studies.jobs import run_jobs
 from studies.output_observer_report import write_report
 from studies.record import run_record
 from studies.settings import fingerprint
 
 NAME = "output_observer"
+DESIGN = "lpvhinf.Design"
 CHECKPOINT = "lpvhinf.Checkpoint"
 MEASURES = "lpvhinf.Measures"
 RESPONSES = "lpvhinf.Responses"
@@ -69,10 +71,14 @@ class Settings:
             positive(name, getattr(self, name))
         if np.any(finite_array("epsilons", self.epsilons, (None,)) <= 0.0):
             raise DomainError(f"epsilons is {self.epsilons}, wanted values above 0.")
+        for name in ("degree", "exchange_rounds", "seed"):
+            whole_number(name, getattr(self, name), 0)
         for name in ("n_flex", "n_plant_modes", "n_positions", "n_search", "starts", "max_iterations", "jobs"):
-            value = getattr(self, name)
-            if not isinstance(value, int) or value < 1:
-                raise DomainError(f"{name} is {value!r}, wanted a whole number of at least 1.")
+            whole_number(name, getattr(self, name), 1)
+        for name in ("stability_grid", "measure_grid", "response_grid"):
+            whole_number(name, getattr(self, name), 1)
+        if not isinstance(self.with_Ty, bool):
+            raise DomainError(f"with_Ty is {self.with_Ty!r}, wanted true or false.")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,6 +90,7 @@ class Job:
     input_decoupling: str = "extended"
     sensing: str = "all"
     epsilon: float
+    exchange: bool = True
 
 
 def jobs_of(settings: Settings) -> tuple[list[Job], list[Job]]:
@@ -94,28 +101,54 @@ def jobs_of(settings: Settings) -> tuple[list[Job], list[Job]]:
         Job(name="conventional-rigid", architecture="rigid-body", input_decoupling="rigid-body", epsilon=main),
     ]
     observers = [Job(name="observer", architecture="output-observer", epsilon=main)]
+    if settings.with_Ty:
+        # one round is enough to show what it cannot do; early, because it takes longest
+        literal = Job(
+            name="observer-Ty", architecture="output-observer", sensing="rigid-body", epsilon=main, exchange=False
+        )
+        observers.append(literal)
     observers += [
         Job(name=f"observer-epsilon-{value:g}", architecture="output-observer", epsilon=value)
         for value in settings.epsilons
         if value != main
     ]
-    if settings.with_Ty:
-        observers.append(Job(name="observer-Ty", architecture="output-observer", sensing="rigid-body", epsilon=main))
     return conventional, observers
 
 
 def run(settings: Settings, out: Path, progress: Progress) -> None:
     """Run the study into the folder `out`; designs that are there already, from the same settings, are kept."""
     began = time.time()
-    out.mkdir(parents=True, exist_ok=True)
-    write_json(out / "settings.json", {"study": NAME, **dataclasses.asdict(settings)})
+    make_folder(out)
     conventional, observers = jobs_of(settings)
+    keys = {job.name: key_of(settings, job) for job in [*conventional, *observers]}
+    write_json(out / "settings.json", {"study": NAME, **dataclasses.asdict(settings)})
+    write_json(out / "designs.json", keys)  # what belongs to these settings; other folders are leftovers
     for stage in (conventional, observers):
         tasks = [(job.name, (settings, job, out)) for job in stage]
         run_jobs(run_design, tasks, jobs=settings.jobs, progress=progress)
     write_json(out / "run.json", run_record(seed=settings.seed, began=began))
     write_report(out)
     progress.log(f"report in {out / 'report.md'}")
+
+
+def key_of(settings: Settings, job: Job) -> str:
+    """A key of everything that a stored design depends on."""
+    ours = dataclasses.asdict(settings)
+    relevant = {k: v for k, v in ours.items() if k not in ("jobs", "epsilons", "epsilon", "with_Ty")}
+    return fingerprint(relevant, job, lpvhinf.__version__)
+
+
+def finished(folder: Path, key: str) -> bool:
+    """Whether a folder holds a finished design of this key, every file readable."""
+    try:
+        summary = read_json(folder / "summary.json")
+        for name, kind in (("design", DESIGN), ("measures", MEASURES), ("responses", RESPONSES)):
+            read_arrays(folder / f"{name}.npz", kind)
+        for name in ("plant", "controller", "closed_loop", "performance_loop"):
+            LPVStateSpace.load(folder / f"{name}.npz")
+    except StorageError:
+        return False
+    return isinstance(summary, dict) and summary.get("fingerprint") == key
 
 
 def decoupled_plant(settings: Settings, job: Job) -> DecoupledPlant:
@@ -138,17 +171,11 @@ def grid(box: Array, n: int) -> Array:
 def run_design(settings: Settings, job: Job, out: Path, progress: Progress) -> None:
     """Design, measure and store one job, unless it is there already."""
     folder = out / "designs" / job.name
-    folder.mkdir(parents=True, exist_ok=True)
-    relevant = {
-        k: v for k, v in dataclasses.asdict(settings).items() if k not in ("jobs", "epsilons", "epsilon", "with_Ty")
-    }
-    key = fingerprint(relevant, job)
-    summary = folder / "summary.json"
-    if summary.is_file():
-        with contextlib.suppress(StorageError):
-            if read_json(summary).get("fingerprint") == key:
-                progress.log("taken from the results folder")
-                return
+    make_folder(folder)
+    key = key_of(settings, job)
+    if finished(folder, key):
+        progress.log("taken from the results folder")
+        return
     plant = decoupled_plant(settings, job)
     specification = Specification(f_bw=settings.f_bw, epsilon=job.epsilon)
     checkpoint = folder / "checkpoint.npz"
@@ -161,7 +188,7 @@ def run_design(settings: Settings, job: Job, out: Path, progress: Progress) -> N
         warm_start=_warm_start(folder, key, progress),
         rigid_start=_conventional_gains(job, out),
         starts=settings.starts,
-        exchange_rounds=settings.exchange_rounds,
+        exchange_rounds=settings.exchange_rounds if job.exchange else 0,
         n_search=settings.n_search,
         max_iterations=settings.max_iterations,
         seed=settings.seed,
@@ -193,7 +220,7 @@ def run_design(settings: Settings, job: Job, out: Path, progress: Progress) -> N
     values: dict[str, Any] = {"fingerprint": key, **dataclasses.asdict(job), **figures(design, measures)}
     values |= {"largest_real_part": float(np.max(poles)), "n_dense": len(dense), "fit_error": fit}
     values["worst_pole_position"] = dense[int(np.argmax(poles))]
-    write_json(summary, values)
+    write_json(folder / "summary.json", values)  # last: it says that the design is finished
     checkpoint.unlink(missing_ok=True)
 
 
@@ -238,11 +265,11 @@ def _conventional_gains(job: Job, out: Path) -> Array | None:
     """Parameters of K_RB that an observer design starts from."""
     if job.architecture == "rigid-body":
         return None
-    return np.asarray(read_arrays(out / "designs" / "conventional" / "design.npz", "lpvhinf.Design")["parameters"])
+    return np.asarray(read_arrays(out / "designs" / "conventional" / "design.npz", DESIGN)["parameters"])
 
 
 def _conventional_positions(settings: Settings, job: Job, out: Path) -> Array | None:
     """Observer designs take over the positions that the conventional design found to matter."""
     if job.architecture == "rigid-body":
         return None
-    return np.asarray(read_arrays(out / "designs" / "conventional" / "design.npz", "lpvhinf.Design")["positions"])
+    return np.asarray(read_arrays(out / "designs" / "conventional" / "design.npz", DESIGN)["positions"])

@@ -16,18 +16,32 @@ PEAK_REDUCTION_DB = 15.0
 
 def write_report(out: Path) -> None:
     """Write report.json and report.md."""
-    designs = {path.parent.name: read_json(path) for path in sorted(out.glob("designs/*/summary.json"))}
-    for name in ("conventional", "observer"):
-        if name not in designs:
-            raise StorageError(f"{out} has no finished design {name!r}. Run the study to its end first.")
+    settings, designs = read_json(out / "settings.json"), summaries(out)
     report = {
-        "settings": read_json(out / "settings.json"),
+        "settings": settings,
         "run": read_json(out / "run.json"),
         "designs": designs,
         "claims": claims(designs),
     }
     write_json(out / "report.json", report)
     write_text(out / "report.md", markdown(report))
+
+
+def summaries(out: Path) -> dict[str, Any]:
+    """The summaries of the designs that belong to the folder's settings, in their order.
+
+    Raises
+    ------
+    StorageError
+        If one is missing, or was made with other settings.
+    """
+    designs = {}
+    for name, key in read_json(out / "designs.json").items():
+        summary = read_json(out / "designs" / name / "summary.json")
+        if not isinstance(summary, dict) or summary.get("fingerprint") != key:
+            raise StorageError(f"the design {name!r} in {out} comes from other settings. Run the study again.")
+        designs[name] = summary
+    return designs
 
 
 def claims(designs: dict[str, Any]) -> list[dict[str, Any]]:

@@ -30,7 +30,7 @@ def load_settings(cls: type[T], study: str, preset: str, **overrides: Any) -> T:
         raise DomainError(f"preset is {preset!r}, wanted one of {', '.join(known)} or the path of a .toml file.")
     try:
         values = tomllib.loads(path.read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # not TOML, or not UTF-8
         raise DomainError(f"{path} is not valid TOML: {error}.") from error
     return from_mapping(cls, values | {key: value for key, value in overrides.items() if value is not None})
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
 from pathlib import Path
 
 import numpy as np
@@ -82,14 +84,19 @@ def small_positions() -> Array:
 
 @pytest.fixture(scope="session")
 def tiny_results(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The results folder of the study output_observer, preset tiny: most of a minute, once a session.
+    """The results folder of the study output_observer, preset tiny: most of a minute, once for all workers.
 
-    Tests that use it belong to the group "tiny", so that one worker alone runs the study.
+    The first worker that wants it runs the study, others wait for it: their folders have a common parent.
     """
     from lpvhinf.progress import SILENT
     from studies import output_observer
     from studies.settings import load_settings
 
-    folder = tmp_path_factory.mktemp("tiny")
-    output_observer.run(load_settings(output_observer.Settings, output_observer.NAME, "tiny"), folder, SILENT)
+    own = tmp_path_factory.getbasetemp()
+    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "tiny"
+    with folder.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # until the file is closed
+        if not (folder / "report.json").is_file():
+            settings = load_settings(output_observer.Settings, output_observer.NAME, "tiny")
+            output_observer.run(settings, folder, SILENT)
     return folder

@@ -11,6 +11,7 @@ from pathlib import Path
 import lpvhinf
 from lpvhinf.cli.terminal import TerminalProgress
 from lpvhinf.errors import DomainError, LpvHinfError
+from lpvhinf.storage import make_folder
 
 
 def parser() -> argparse.ArgumentParser:
@@ -32,6 +33,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser().parse_args(argv)
     try:
         specification = read_specification(arguments.settings)
+        make_folder(arguments.out)  # before the work, which would else be lost
         plant = lpvhinf.decouple(lpvhinf.mmpa.benchmark(n_flex=arguments.plant_modes), n_flex=arguments.n_flex)
         with TerminalProgress() as progress:
             design = lpvhinf.codesign(plant, arguments.architecture, specification, progress=progress)
@@ -58,6 +60,6 @@ def read_specification(path: Path | None) -> lpvhinf.Specification:
         return lpvhinf.Specification()
     try:
         values = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, tomllib.TOMLDecodeError) as error:
+    except (OSError, ValueError) as error:
         raise DomainError(f"settings {path} cannot be read as TOML: {error}.") from error
     return lpvhinf.Specification.from_mapping(values)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lpvhinf.checks import Array, finite_array, points_in_box, read_only
+from lpvhinf.checks import Array, finite_array, points_in_box, positive, read_only, whole_number
 from lpvhinf.codesign.assembly import ARCHITECTURES, Assembly
 from lpvhinf.codesign.design import Design
 from lpvhinf.codesign.positions import design_positions, norms_at, worst_position
@@ -21,7 +21,7 @@ from lpvhinf.progress import SILENT, Progress
 
 # The bundle's trust region can shrink on kinks far from a minimum: the solver starts again from where it ended as
 # long as that pays.
-MAX_PASSES = 4
+MAX_PASSES = 2
 PASS_GAIN = 0.005
 DESCENT_TOLERANCE = 1e-3
 
@@ -91,7 +91,7 @@ def codesign(
     Raises
     ------
     DomainError
-        If the architecture is unknown or a position lies outside of P.
+        If the architecture is unknown, a position lies outside of P, or a number is out of its range.
     SynthesisError
         If no stabilising parameters are found.
     """
@@ -101,6 +101,17 @@ def codesign(
         raise DomainError(f"architecture is {architecture!r}, wanted one of {', '.join(ARCHITECTURES)}.")
     if architecture != "rigid-body" and decoupled.n_flex == 0:
         raise DomainError("n_flex is 0, wanted at least 1 preserved flexible mode for an observer design.")
+    for name, value, least in (
+        ("n_positions", n_positions, 1),
+        ("starts", starts, 1),
+        ("exchange_rounds", exchange_rounds, 0),
+        ("n_search", n_search, 1),
+        ("max_iterations", max_iterations, 1),
+        ("seed", seed, 0),
+        ("jobs", jobs, 1),
+    ):
+        whole_number(name, value, least)
+    positive("exchange_tolerance", exchange_tolerance)
     spec.warn_if_demanding(decoupled)
     assembly = Assembly(plant=decoupled, specification=spec, architecture=architecture)
     active = (
@@ -174,12 +185,18 @@ def _initial(
 ) -> list[Array]:
     """Starts of the solver, from what the caller has."""
     if isinstance(warm_start, Design) and warm_start.architecture == assembly.architecture:
-        return [np.asarray(warm_start.parameters)]
+        return [_translated(assembly, warm_start)]
     if warm_start is not None and not isinstance(warm_start, Design):
         return [finite_array("warm_start", warm_start, (assembly.structure.n_parameters,))]
     if isinstance(warm_start, Design):
-        rigid_start = warm_start.assembly.split(warm_start.parameters)[0]
+        rigid_start = assembly.rigid_body.parameters(warm_start.K_RB)
     if rigid_start is None:
         return rigid_starts(assembly, starts)
     rigid = finite_array("rigid_start", rigid_start, (assembly.rigid_body.n_parameters,))
     return [rigid] if assembly.observer is None else observer_starts(assembly, active, rigid, starts)
+
+
+def _translated(assembly: Assembly, design: Design) -> Array:
+    """The parameters of a design of the same architecture, K_RB in this design's units."""
+    own = assembly.rigid_body.parameters(design.K_RB)
+    return np.concatenate([own, np.asarray(design.parameters)[len(own) :]])

@@ -13,6 +13,8 @@ from lpvhinf.codesign.assembly import Assembly
 from lpvhinf.fitting import spread_points
 from lpvhinf.hinfstruct import hinf_norm
 
+UNSTABLE = 1e9  # what the simplex search gets for an infinite norm
+
 
 def design_positions(box: Array, n: int, *, seed: int = 0) -> Array:
     """`n` positions: the corners, and an even spread whose spacing has nothing in common with a magnet pitch.
@@ -77,16 +79,17 @@ def worst_position(
         step = 0.03 * width * np.where(points[i] > np.mean(box, axis=1), -1.0, 1.0)
         simplex = np.vstack([points[i], points[i] + np.diag(step)])
         search = scipy.optimize.minimize(
-            lambda p: -min(float(norms_at(assembly, theta, np.clip(p, box[:, 0], box[:, 1])[None])[0]), 1e9),
+            lambda p: -min(float(norms_at(assembly, theta, np.clip(p, box[:, 0], box[:, 1])[None])[0]), UNSTABLE),
             points[i],
             method="Nelder-Mead",
             bounds=box,
             options={"initial_simplex": simplex, "maxfev": 30, "xatol": 1e-4 * float(np.min(width)), "fatol": 1e-4},
         )
         count += int(search.nfev)
-        better = -search.fun > gammas[i]
+        reached = np.inf if -search.fun >= UNSTABLE else -float(search.fun)
+        better = reached > gammas[i]
         found_at.append(np.clip(search.x, box[:, 0], box[:, 1]) if better else points[i])
-        found.append(float(-search.fun) if better else float(gammas[i]))
+        found.append(reached if better else float(gammas[i]))
     order = np.argsort(-np.array(found))
     candidates, values = np.array(found_at)[order], np.array(found)[order]
     return WorstPosition(

@@ -72,7 +72,7 @@ class Specification:
             positive(name, getattr(self, name))
         for name in ("f_bw", "epsilon", "expected_error"):
             value = getattr(self, name)
-            if value is not None and np.any(finite_array(name, value) <= 0.0):
+            if value is not None and (np.size(value) == 0 or np.any(finite_array(name, value) <= 0.0)):
                 raise DomainError(f"{name} is {value}, wanted values above 0.")
         if finite_array("delay", self.delay, ()) < 0.0:
             raise DomainError(f"delay is {self.delay}, wanted 0 or more seconds.")

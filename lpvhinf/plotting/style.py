@@ -26,6 +26,7 @@ BLUE: Final = "#0072B2"
 VERMILION: Final = "#D55E00"
 PURPLE: Final = "#CC79A7"
 GREY: Final = "#7F7F7F"
+RED: Final = "#C8102E"  # for bounds only, which are dotted: red in the paper, and told apart by the dots
 PALETTE: Final = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 
 # The same thing has the same colour in every figure.
@@ -33,7 +34,7 @@ ROLES: Final = {
     "rigid-body": BLACK,
     "output-observer": BLUE,
     "error-observer": GREEN,
-    "shaping": VERMILION,
+    "shaping": RED,
     "tuned": ORANGE,
 }
 

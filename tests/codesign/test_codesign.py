@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import warnings
+from collections.abc import Callable
 from typing import Any
 
 import control
@@ -12,15 +14,14 @@ import scipy.optimize
 
 from lpvhinf.checks import Array
 from lpvhinf.codesign import Design, Specification, codesign
-from lpvhinf.codesign.codesign import _initial
+from lpvhinf.codesign.assembly import Assembly
+from lpvhinf.codesign.codesign import _initial, _translated
 from lpvhinf.codesign.positions import norms_at
 from lpvhinf.controllers import RigidBodyGains
 from lpvhinf.decoupling import DecoupledPlant, decouple
-from lpvhinf.errors import DimensionError, DomainError, LpvHinfError, LpvHinfWarning
+from lpvhinf.errors import DimensionError, DomainError, LpvHinfWarning, SynthesisError
 from lpvhinf.fitting import interpolate
 from lpvhinf.plant import ModalModel
-
-pytestmark = pytest.mark.xdist_group("codesign")
 
 QUICK: dict[str, Any] = {"n_positions": 3, "starts": 1, "max_iterations": 1, "exchange_rounds": 0, "n_search": 1}
 HERTZ = np.geomspace(0.1, 2000.0, 400)
@@ -47,23 +48,18 @@ def four_block(design: Design, p: Array, omega: float) -> float:
 
 def test_gamma_is_the_peak_of_the_formula(rigid: Design) -> None:
     assert rigid.stabilizing
-    peaks = []
-    for p in rigid.positions:
-        grid = np.unique(
-            np.concatenate([[1e-3], HERTZ, *(w * np.linspace(0.97, 1.03, 61) for w in (60.0, 110.0, 240.0))])
-        )
+    near = [w * np.linspace(0.97, 1.03, 61) for w in (60.0, 110.0, 240.0)]
+    grid = np.unique(np.concatenate([[1e-3], HERTZ, *near]))
+    for p, gamma in zip(rigid.positions, rigid.gammas, strict=True):
         values = np.array([four_block(rigid, p, 2 * np.pi * f) for f in grid])
-        best = int(np.argmax(values))
-        around = (grid[max(0, best - 1)], grid[min(best + 1, len(grid) - 1)])
-        fine = scipy.optimize.minimize_scalar(
-            lambda f, p=p: -four_block(rigid, p, 2 * np.pi * f),
-            bounds=around,
-            method="bounded",
-            options={"xatol": 1e-9},
-        )
-        peaks.append(max(values[best], -fine.fun))
-    print(np.array(peaks)/rigid.gammas-1, grid[best], peaks, [four_block(rigid, rigid.positions[0], 2*np.pi*f) for f in (1e-4,1e-3,.01,.1,1.)])
-    assert peaks == pytest.approx(rigid.gammas, rel=1e-6)
+        tops = np.flatnonzero((values[1:-1] >= values[:-2]) & (values[1:-1] >= values[2:])) + 1
+        peak = float(np.max(values))
+        for k in tops[values[tops] > 0.95 * peak]:
+            fine = scipy.optimize.minimize_scalar(
+                lambda f, p=p: -four_block(rigid, p, 2 * np.pi * f), bounds=grid[[k - 1, k + 1]], method="bounded"
+            )
+            peak = max(peak, -float(fine.fun))
+        assert peak == pytest.approx(gamma, rel=1e-6)
     assert rigid.gamma == np.max(rigid.gammas) <= rigid.gamma_worst
 
 
@@ -139,7 +135,7 @@ def test_L_and_xi_are_physical(observer: Design) -> None:
 def test_a_finished_design_is_its_own_start(rigid: Design, observer: Design) -> None:
     for design in (rigid, observer):
         (start,) = _initial(design.assembly, design.positions, design, None, 2)
-        assert np.array_equal(start, design.parameters)
+        assert np.allclose(start, design.parameters, rtol=1e-12, atol=1e-12)
         (start,) = _initial(design.assembly, design.positions, design.parameters.tolist(), None, 2)
         assert np.array_equal(start, design.parameters)
 
@@ -149,8 +145,8 @@ def test_an_observer_starts_from_the_conventional_gains(rigid: Design, observer:
     by_gains = _initial(observer.assembly, rigid.positions, None, rigid.parameters, 2)
     assert len(by_design) == 2
     for one, other in zip(by_design, by_gains, strict=True):
-        assert np.array_equal(one, other)
-        assert np.array_equal(one[:10], rigid.parameters)
+        assert np.allclose(one, other, rtol=1e-12, atol=1e-12)
+        assert np.allclose(one[:10], rigid.parameters, rtol=1e-12, atol=1e-12)
         assert one[-1] < 0.0  # damps
 
 
@@ -165,6 +161,15 @@ def test_going_on_is_never_worse(small_plant: DecoupledPlant, rigid: Design, wan
 def test_gains_are_round_tripped(rigid: Design) -> None:
     assert isinstance(rigid.K_RB, RigidBodyGains)
     assert np.allclose(rigid.assembly.rigid_body.parameters(rigid.K_RB), rigid.parameters, rtol=1e-12)
+
+
+def test_gains_are_kept_for_another_bandwidth(small_plant: DecoupledPlant, rigid: Design) -> None:
+    """Parameters are relative to the bandwidth; a start is the same controller all the same."""
+    slower = dataclasses.replace(rigid.specification, f_bw=[6.0, 7.5])
+    assembly = Assembly(plant=small_plant, specification=slower, architecture="rigid-body")
+    start = assembly.rigid_body.gains(_translated(assembly, rigid))
+    assert np.allclose(start.gain, rigid.K_RB.gain, rtol=1e-12)
+    assert np.allclose(start.f_d, rigid.K_RB.f_d, rtol=1e-12)
 
 
 # Refusals
@@ -186,6 +191,11 @@ def test_gains_are_round_tripped(rigid: Design) -> None:
         ({"rigid_start": np.zeros(9)}, DimensionError, r"rigid_start has shape \(9,\), wanted \(10\)"),
         ({"rigid_start": np.full(10, np.inf)}, DomainError, r"rigid_start\[0\] is inf"),
         ({"max_iterations": 0}, DomainError, "max_iterations is 0"),
+        ({"exchange_rounds": -1}, DomainError, "exchange_rounds is -1"),
+        ({"n_positions": 2.5}, DomainError, "n_positions is 2.5"),
+        ({"n_search": 0}, DomainError, "n_search is 0"),
+        ({"starts": -1}, DomainError, "starts is -1"),
+        ({"exchange_tolerance": np.nan}, DomainError, "exchange_tolerance is nan"),
         ({"jobs": 0}, DomainError, "jobs is 0"),
         ({"time_limit": -1.0}, DomainError, "time_limit is -1.0"),
         ({"tolerance": 0.0}, DomainError, "tolerance is 0.0"),
@@ -208,12 +218,18 @@ def test_values_for_another_number_of_axes(small_plant: DecoupledPlant) -> None:
         codesign(small_plant, "rigid-body", Specification(f_bw=[10.0, 10.0, 10.0]), **QUICK)
 
 
+def _end_of(work: Callable[[], Design]) -> Design | SynthesisError:
+    """What a design that may well be impossible ends with."""
+    try:
+        return work()
+    except SynthesisError as error:
+        return error
+
+
 def test_a_bandwidth_in_the_band_of_a_discarded_mode_warns(small_plant: DecoupledPlant) -> None:
+    demanding = Specification(f_bw=[10.0, 300.0])
     with pytest.warns(LpvHinfWarning, match=r"f_bw = 300\.0 Hz is above the first discarded mode at 110\.0 Hz"):
-        try:
-            codesign(small_plant, "rigid-body", Specification(f_bw=300.0), time_limit=2.0, **QUICK)
-        except LpvHinfError as error:
-            assert "stabil" in str(error)
+        _end_of(lambda: codesign(small_plant, "rigid-body", demanding, time_limit=2.0, **QUICK))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         codesign(small_plant, "rigid-body", Specification(f_bw=10.0), **QUICK)

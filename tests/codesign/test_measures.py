@@ -17,8 +17,6 @@ from lpvhinf.decoupling import DecoupledPlant
 from lpvhinf.hinfstruct.response import Response
 from lpvhinf.progress import Progress
 
-pytestmark = pytest.mark.xdist_group("codesign")
-
 POINTS = np.array([[-0.08], [0.011], [0.06]])
 Make = Callable[[Assembly, Array], Design]
 
@@ -31,7 +29,7 @@ def plant_response(design: Design, p: Array, s: complex) -> Array:
     G[:n, :n] += np.eye(n) / s**2
     for b, c, w, z in zip(gains.B[0, n:], gains.C[0].T[n:], plant.omega[n:], plant.zeta[n:], strict=True):
         G = G + np.outer(c, b) / (s**2 + 2 * z * w * s + w**2)
-    return G
+    return np.asarray(G)
 
 
 def test_crossover_of_the_conventional_loop(rigid: Design) -> None:
@@ -66,7 +64,7 @@ def test_there_may_be_no_crossover(rigid: Design, with_parameters: Make) -> None
 
 def test_the_peak_of_the_sensitivity(rigid: Design) -> None:
     measures = measure(rigid, POINTS)
-    omega = 2 * np.pi * np.unique(np.concatenate([np.geomspace(0.5, 500.0, 3000), np.linspace(55.0, 65.0, 500)]))
+    omega = 2 * np.pi * np.unique(np.concatenate([np.geomspace(0.5, 500.0, 1000), np.linspace(59.0, 61.0, 100)]))
     error, K = rigid.specification.errors(2), rigid.K_RB.response(omega)
     for p, peak in zip(POINTS, measures.sensitivity_peak, strict=True):
         sizes = []
@@ -81,7 +79,7 @@ def test_the_peak_of_the_sensitivity(rigid: Design) -> None:
 def test_peaks_of_the_flexible_modes(name: str, request: pytest.FixtureRequest) -> None:
     design: Design = request.getfixturevalue(name)
     measures = measure(design, POINTS)
-    omega = np.unique(np.concatenate([2 * np.pi * np.geomspace(5.0, 1000.0, 4000)]))
+    omega = 2 * np.pi * np.geomspace(5.0, 1000.0, 4000)
     own = (omega > 2 * np.pi * 60.0 / np.sqrt(2)) & (omega < 2 * np.pi * 60.0 * np.sqrt(2))
     for k, (A, B, C, D) in enumerate(design.frozen(POINTS)):
         gains = np.linalg.norm(Response(A, B[:, 4:], C[:2], D[:2, 4:]).at(omega)[:, :, 0], axis=1)
@@ -114,7 +112,7 @@ def test_without_feedback_the_dampings_are_the_plants(small_plant: DecoupledPlan
 
 
 def test_damping_grows_with_xi(observer: Design, with_parameters: Make) -> None:
-    """A little damping force at the resonance: the pole moves by xi/2, as for a perfectly known velocity."""
+    """Without a damping force only the spill-over of K_RB moves the pole."""
     theta = observer.parameters.copy()
     found = []
     for factor in (0.0, 0.5, 1.0):

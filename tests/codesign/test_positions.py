@@ -15,8 +15,6 @@ from lpvhinf.codesign.assembly import Assembly
 from lpvhinf.codesign.positions import norms_at
 from lpvhinf.codesign.starts import observer_starts, rigid_starts
 
-pytestmark = pytest.mark.xdist_group("codesign")
-
 BOX = np.array([[-0.2, 0.1], [1.0, 3.0]])
 
 
@@ -81,6 +79,16 @@ def test_an_unstable_position_is_the_worst(rigid: Design, monkeypatch: pytest.Mo
     worst = worst_position(rigid.assembly, rigid.parameters, n_search=16)
     assert worst.gamma == np.inf
     assert worst.position[0] > 0.05
+
+
+def test_an_instability_that_the_climb_finds_is_infinite(rigid: Design, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A band that no position of the spread lies in, on the way up to its edge."""
+    spread = Search(lambda p: 2.0 + float(p[0]))
+    monkeypatch.setattr(module, "norms_at", spread)
+    worst_position(rigid.assembly, rigid.parameters, n_search=4, n_refine=1)
+    highest = max(float(p[0]) for p in spread.points[:4])
+    monkeypatch.setattr(module, "norms_at", Search(lambda p: np.inf if p[0] > highest + 1e-6 else 2.0 + float(p[0])))
+    assert worst_position(rigid.assembly, rigid.parameters, n_search=4, n_refine=1).gamma == np.inf
 
 
 @pytest.mark.parametrize("seed", [1, 2])

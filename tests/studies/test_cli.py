@@ -72,6 +72,9 @@ def test_an_unknown_study_is_refused(capsys: pytest.CaptureFixture[str]) -> None
         (TINY.replace("epsilons = [0.1]", "epsilons = 0.1"), "epsilons has shape ()"),
         (TINY.replace("n_positions = 5", "n_positions = 0"), "n_positions is 0, wanted a whole number"),
         (TINY.replace("n_positions = 5", "n_positions = 5.5"), "n_positions is 5.5, wanted a whole number"),
+        (TINY.replace("stability_grid = 15", "stability_grid = 0"), "stability_grid is 0, wanted a whole number"),
+        (TINY.replace("degree = 20", "degree = -1"), "degree is -1, wanted a whole number of at least 0"),
+        (TINY.replace("with_Ty = false", 'with_Ty = "no"'), "with_Ty is 'no', wanted true or false"),
         (TINY.replace("starts = 1", "starts = 0"), "starts is 0, wanted a whole number of at least 1"),
     ],
 )
@@ -112,7 +115,7 @@ def test_a_report_of_nothing(capsys: pytest.CaptureFixture[str], tmp_path: Path)
     assert "settings.json cannot be read as JSON" in capsys.readouterr().err
     (tmp_path / "settings.json").write_text("{}", encoding="utf-8")
     assert main(["report", str(tmp_path)]) == 1
-    assert "has no finished design 'conventional'. Run the study" in capsys.readouterr().err
+    assert "designs.json cannot be read as JSON" in capsys.readouterr().err
 
 
 # The console script

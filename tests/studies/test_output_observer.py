@@ -20,8 +20,6 @@ from lpvhinf.storage import read_arrays, read_json
 from studies import output_observer
 from studies.output_observer import Job, Settings, jobs_of
 
-pytestmark = pytest.mark.xdist_group("tiny")
-
 DESIGNS = ("conventional", "conventional-rigid", "observer")
 COMPARED = ("conventional", "observer")
 FILES = ("plant", "controller", "closed_loop", "performance_loop", "design", "measures", "responses")
@@ -129,7 +127,7 @@ def test_the_report_says_that_the_claims_hold(tiny_results: Path) -> None:
 
 def test_the_folder_is_complete(tiny_results: Path) -> None:
     assert {path.name for path in tiny_results.iterdir()} == {
-        "designs", "report.md", "report.json", "run.json", "settings.json",
+        "designs", "designs.json", "report.md", "report.json", "run.json", "settings.json",
     }  # fmt: skip
     assert {path.name for path in (tiny_results / "designs").iterdir()} == set(DESIGNS)
     for name in DESIGNS:
@@ -142,7 +140,7 @@ def test_json_files_hold_no_NaN(tiny_results: Path) -> None:
         raise AssertionError(constant)
 
     files = sorted(tiny_results.rglob("*.json"))
-    assert len(files) == 3 + len(DESIGNS)
+    assert len(files) == 4 + len(DESIGNS)
     for path in files:
         json.loads(path.read_text("utf-8"), parse_constant=refuse)
 

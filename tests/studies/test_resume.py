@@ -16,10 +16,8 @@ from lpvhinf.errors import StorageError
 from lpvhinf.progress import SILENT, Progress
 from lpvhinf.storage import read_arrays, read_json, write_arrays, write_json
 from studies import output_observer
-from studies.output_observer import Job, Settings, jobs_of, run, run_design
+from studies.output_observer import Job, Settings, jobs_of, key_of, run, run_design
 from studies.output_observer_report import write_report
-
-pytestmark = pytest.mark.xdist_group("resume")
 
 SMALLEST = Settings(
     f_bw=40.0,
@@ -240,7 +238,21 @@ def test_without_the_conventional_design_an_observer_says_what_is_missing(tmp_pa
         run_design(SMALLEST, OBSERVER, tmp_path, SILENT)
 
 
-def test_a_report_needs_both_designs(folder: Path) -> None:
+def test_a_report_needs_every_design(folder: Path) -> None:
     write_json(folder / "run.json", {})
-    with pytest.raises(StorageError, match=r"no finished design 'observer'\. Run the study to its end"):
+    keys = {job.name: key_of(SMALLEST, job) for job in (CONVENTIONAL, OBSERVER)}
+    write_json(folder / "designs.json", keys)
+    with pytest.raises(StorageError, match=r"observer/summary\.json cannot be read"):
         write_report(folder)
+    write_json(folder / "designs.json", keys | {"conventional": "other"})
+    with pytest.raises(StorageError, match=r"'conventional' in .* comes from other settings"):
+        write_report(folder)
+
+
+@pytest.mark.usefixtures("asked")
+@pytest.mark.parametrize("name", ["design", "measures", "closed_loop"])
+def test_a_design_with_a_damaged_file_is_made_anew(folder: Path, name: str) -> None:
+    path = folder / "designs/conventional" / f"{name}.npz"
+    path.write_bytes(path.read_bytes()[:100])
+    with pytest.raises(Reached):
+        run_design(SMALLEST, CONVENTIONAL, folder, SILENT)
