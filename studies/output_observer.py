@@ -109,7 +109,7 @@ def jobs_of(settings: Settings) -> tuple[list[Job], list[Job]]:
         observers.append(literal)
     observers += [
         Job(name=f"observer-epsilon-{value:g}", architecture="output-observer", epsilon=value)
-        for value in settings.epsilons
+        for value in sorted(settings.epsilons, reverse=True)  # the most demanding first: they take longest
         if value != main
     ]
     return conventional, observers
