@@ -37,7 +37,8 @@ def make(results: Path, out: Path) -> list[Path]:
         left.semilogx(epsilon, column("flexible_peak_dB"), "s--", color=color, label="all frequencies", mfc="white")
         left.axhline(reference[0]["mode_peak_dB"], color=plain, label="conventional")
         left.set_ylabel("worst flexible-mode peak [dB]")
-        left.legend()
+        left.set_ylim(5.0, 50.0)  # room for the legend above the conventional line
+        left.legend(loc="upper right")
         controlled = 100.0 * np.array([min(s["damping_min"]) for s in observers])
         middle.loglog(epsilon, controlled, "o-", color=color, label="controlled mode")
         middle.loglog(
@@ -49,7 +50,7 @@ def make(results: Path, out: Path) -> list[Path]:
         right.semilogx(epsilon, column("gamma"), "o-", color=color, label="observer")
         right.axhline(reference[0]["gamma"], color=plain, label="conventional (4-block)")
         right.set_ylabel(r"$\gamma$")
-        right.set_ylim(bottom=0.0)
+        right.set_ylim(0.0, 1.4 * float(np.nanmax(column("gamma"))))
         right.legend()
         for ax in (left, middle, right):
             ax.set_xlabel(r"$\epsilon$")

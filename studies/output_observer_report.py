@@ -166,6 +166,8 @@ def notes(designs: dict[str, Any]) -> list[str]:
     out = [
         "Mode peak: from the flexible-mode input to the error, within half an octave of the controlled mode; flexible "
         "peak: over all frequencies, discarded modes included. 0 dB is the static error where the mode is best seen.",
+        "Where the flexible peak is above the mode peak, a discarded mode sets it: the modal input excites it as well, "
+        "and damping the controlled mode can cost it some of its own damping (spill-over).",
         "gamma over P comes from a search, not from a proof.",
     ]
     literal = designs.get("observer-Ty")

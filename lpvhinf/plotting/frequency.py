@@ -68,7 +68,7 @@ def draw_blocks(figure: Figure, designs: list[BlockCurves], bounds: Array, omega
                 bound = np.interp(np.log(design.omega), np.log(omega), decibel(bounds[i, j]))
                 worst = int(np.argmax(np.max(sigma - bound, axis=1)))
                 # the first one is drawn wider, so that it is seen below one that equals it
-                width = 0.9 if rank else 1.9
+                width = 0.8 if rank else 1.6
                 ax.plot(hertz, sigma[worst], color=color, linewidth=width, label=design.label)
                 top = max(top, float(np.max(sigma)))
             ax.plot(
