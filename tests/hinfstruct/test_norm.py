@@ -8,6 +8,7 @@ import pytest
 from lpvhinf.errors import DimensionError, DomainError
 from lpvhinf.hinfstruct import hinf_norm
 from lpvhinf.hinfstruct import norm as norm_module
+from lpvhinf.hinfstruct import response as response_module
 from lpvhinf.hinfstruct.peaks import find_peaks
 from lpvhinf.hinfstruct.response import Response, largest_sigma
 
@@ -90,7 +91,7 @@ def test_schur_form_agrees_with_the_eigenbasis(monkeypatch: pytest.MonkeyPatch) 
     B, C, D = rng.standard_normal((7, 2)), rng.standard_normal((3, 7)), rng.standard_normal((3, 2))
     omega = np.array([0.0, 0.3, 2.0, 50.0, np.inf])
     by_eigenvectors = Response(A, B, C, D)
-    monkeypatch.setattr("lpvhinf.hinfstruct.response.EIGENVECTOR_LIMIT", 0.0)
+    monkeypatch.setattr(response_module, "EIGENVECTOR_LIMIT", 0.0)
     by_schur = Response(A, B, C, D)
     assert by_schur.left is None
     np.testing.assert_allclose(by_schur.at(omega), by_eigenvectors.at(omega), rtol=1e-10, atol=1e-12)
