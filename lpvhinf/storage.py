@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import tempfile
@@ -33,6 +34,25 @@ def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
         temporary.replace(target)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def one_at_a_time(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Let one process after another into the block, for work whose result they then share at `path`.
+
+    The lock is a file beside `path`. It ends with the process that holds it, however that ends; where the folder
+    cannot be written there is nothing to share, and nobody waits.
+    """
+    lock = Path(path).with_name(f".{Path(path).name}.lock")
+    try:
+        make_folder(lock.parent)
+        stream = lock.open("w")
+    except (OSError, StorageError):
+        yield
+        return
+    with stream:
+        fcntl.flock(stream, fcntl.LOCK_EX)
+        yield
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:

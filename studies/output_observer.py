@@ -28,10 +28,11 @@ from lpvhinf.codesign.report import figures
 from lpvhinf.decoupling import DecoupledPlant, decouple
 from lpvhinf.errors import DomainError, StorageError
 from lpvhinf.plant.mmpa import benchmark
-from lpvhinf.progress import Progress
+from lpvhinf.plant.mmpa.magnetics import KINDS
+from lpvhinf.progress import SILENT, Progress
 from lpvhinf.statespace import LPVStateSpace
 from lpvhinf.storage import make_folder, read_arrays, read_json, write_arrays, write_json
-from studies.jobs import run_jobs
+from lpvhinf.jobs import run_jobs
 from studies.output_observer_report import write_report
 from studies.record import run_record
 from studies.settings import fingerprint
@@ -63,6 +64,7 @@ class Settings:
     measure_grid: int
     response_grid: int
     with_Ty: bool = True
+    magnetics: str = "exact"
     seed: int = 0
     jobs: int = 1
 
@@ -79,6 +81,8 @@ class Settings:
             whole_number(name, getattr(self, name), 1)
         if not isinstance(self.with_Ty, bool):
             raise DomainError(f"with_Ty is {self.with_Ty!r}, wanted true or false.")
+        if self.magnetics not in KINDS:
+            raise DomainError(f"magnetics is {self.magnetics!r}, wanted one of {', '.join(KINDS)}.")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,10 +155,10 @@ def finished(folder: Path, key: str) -> bool:
     return isinstance(summary, dict) and summary.get("fingerprint") == key
 
 
-def decoupled_plant(settings: Settings, job: Job) -> DecoupledPlant:
+def decoupled_plant(settings: Settings, job: Job, progress: Progress = SILENT) -> DecoupledPlant:
     """The plant of one design."""
     return decouple(
-        benchmark(n_flex=settings.n_plant_modes),
+        benchmark(n_flex=settings.n_plant_modes, magnetics=settings.magnetics, progress=progress),
         n_flex=settings.n_flex,
         input_decoupling=job.input_decoupling,
         sensing=job.sensing,
@@ -176,7 +180,7 @@ def run_design(settings: Settings, job: Job, out: Path, progress: Progress) -> N
     if finished(folder, key):
         progress.log("taken from the results folder")
         return
-    plant = decoupled_plant(settings, job)
+    plant = decoupled_plant(settings, job, progress)
     specification = Specification(f_bw=settings.f_bw, epsilon=job.epsilon)
     checkpoint = folder / "checkpoint.npz"
     design = codesign(

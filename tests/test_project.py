@@ -31,6 +31,7 @@ FLOORS = {
     "storage": 0,
     "polynomial": 0,
     "fitting": 0,
+    "jobs": 0,
     "statespace": 1,
     "plant": 2,
     "mmpa": 2,
@@ -48,7 +49,7 @@ FLOORS = {
 }
 ENGINES = ("hinfstruct", "lpv", "certify")  # serve any plant, so they know none
 DRAWING = 6  # the lowest floor that may import matplotlib
-HEAVY = ("matplotlib", "control", "cvxpy", "clarabel", "slycot", "skfem", "rich", "pytest")
+HEAVY = ("matplotlib", "control", "cvxpy", "magpylib", "clarabel", "slycot", "skfem", "rich", "pytest")
 
 
 def modules() -> list[Path]:

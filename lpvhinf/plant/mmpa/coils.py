@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 from numpy.polynomial import legendre
 
-from lpvhinf.checks import Array, read_only
+from lpvhinf.checks import Array, finite_array, read_only
 from lpvhinf.plant.mmpa.parameters import MMPAParameters
 
 
@@ -32,6 +32,8 @@ class CoilLayer:
         Heights of the filaments from the neutral plane of the mover [m].
     turns : (n_heights,)
         Turns that each height stands for.
+    errors : (n_coils, 2)
+        How far each coil lies off its place in the grid [m]; none by default.
     """
 
     x: Array
@@ -41,6 +43,12 @@ class CoilLayer:
     share: Array
     z: Array
     turns: Array
+    errors: Array = field(default_factory=lambda: np.zeros((0, 2)))
+
+    def __post_init__(self) -> None:
+        if len(self.errors) == 0:
+            object.__setattr__(self, "errors", read_only(np.zeros((self.n_coils, 2))))
+        object.__setattr__(self, "errors", read_only(finite_array("errors", self.errors, (self.n_coils, 2))))
 
     @property
     def n_coils(self) -> int:
@@ -49,8 +57,8 @@ class CoilLayer:
 
     @property
     def centres(self) -> Array:
-        """Centres (n_coils, 2) [m]."""
-        return np.stack([np.repeat(self.x, len(self.y)), np.tile(self.y, len(self.x))], axis=1)
+        """Centres (n_coils, 2) [m], position errors included."""
+        return self.errors + np.stack([np.repeat(self.x, len(self.y)), np.tile(self.y, len(self.x))], axis=1)
 
 
 def coil_layers(parameters: MMPAParameters) -> tuple[CoilLayer, CoilLayer]:

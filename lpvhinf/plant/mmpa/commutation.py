@@ -42,7 +42,9 @@ def coil_weights(points: Array, layers: Sequence[CoilLayer], parameters: MMPAPar
     return np.concatenate(parts, axis=1)
 
 
-def weighted_pseudo_inverse(B: ArrayLike, weights: ArrayLike | None = None) -> Array:
+def weighted_pseudo_inverse(
+    B: ArrayLike, weights: ArrayLike | None = None, *, positions: ArrayLike | None = None
+) -> Array:
     r"""The right inverse that minimises :math:`\sum_k u_k^2 / w_k`, for each position.
 
     .. math:: B^\# = W B^\top (B W B^\top)^{-1}, \qquad B B^\# = I
@@ -53,6 +55,8 @@ def weighted_pseudo_inverse(B: ArrayLike, weights: ArrayLike | None = None) -> A
         Input gains with full row rank.
     weights : (N, n_u) or (n_u,), optional
         Weights of the inputs, at least 0; an input with the weight 0 is not used. One for every input if left out.
+    positions : (N, n_p), optional
+        The positions p that B belongs to, for the messages, which else count them.
 
     Returns
     -------
@@ -61,7 +65,8 @@ def weighted_pseudo_inverse(B: ArrayLike, weights: ArrayLike | None = None) -> A
     Raises
     ------
     AssumptionError
-        If fewer inputs than rows are active, or the rows are dependent (the message names the condition number).
+        If fewer inputs than rows are active, or the rows are dependent; the message names the position and the
+        condition number.
     DimensionError, DomainError
         If sizes disagree, a weight is negative, or a number is not finite.
 
@@ -82,11 +87,16 @@ def weighted_pseudo_inverse(B: ArrayLike, weights: ArrayLike | None = None) -> A
     if np.any(w < 0.0):
         raise DomainError(f"weights has the entry {w.min():.6g}, wanted weights of at least 0.")
     w = np.broadcast_to(w, (N, n_u))
+    at = None if positions is None else finite_array("positions", positions, (N, None))
+
+    def where(i: int) -> str:
+        return f"position {i}" if at is None else f"p = {at[i].tolist()}"
+
     active = np.count_nonzero(w, axis=1)
     if np.any(active < n):
         i = int(np.argmax(active < n))
         raise AssumptionError(
-            f"Only {active[i]} of {n_u} inputs are active at position {i}, wanted at least {n}, one for each row of B "
+            f"Only {active[i]} of {n_u} inputs are active at {where(i)}, wanted at least {n}, one for each row of B "
             "(condition number inf). Widen the windows of the weights, or decouple fewer modes."
         )
     weighted = w[:, None, :] * gains
@@ -100,7 +110,7 @@ def weighted_pseudo_inverse(B: ArrayLike, weights: ArrayLike | None = None) -> A
         i = int(np.argmax(ratio))
         number = np.sqrt(ratio[i]) if values[i, 0] > 0.0 else np.inf
         raise AssumptionError(
-            f"The {n} rows of B are dependent at position {i}: condition number {number:.3g} after row scaling, wanted "
+            f"The {n} rows of B are dependent at {where(i)}: condition number {number:.3g} after row scaling, wanted "
             f"at most {MAX_CONDITION:.0e}. Widen the windows of the weights, or decouple fewer modes."
         )
     inverse = (vectors / values[:, None, :]) @ vectors.transpose(0, 2, 1)

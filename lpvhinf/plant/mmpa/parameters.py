@@ -9,6 +9,7 @@ import numpy as np
 
 from lpvhinf.checks import Array, box_array, finite_array, positive, read_only
 from lpvhinf.errors import DomainError
+from lpvhinf.plant.mmpa.plausibility import check_parameters
 
 WHOLE = (
     "magnet_count_half",
@@ -22,7 +23,7 @@ WHOLE = (
     "window_order",
     "ritz_degree",
 )
-SIGNED = ("sensor_z_half_span", "sensor_xy_half_span", "sensor_height", "gravity", "damping")
+SIGNED = ("sensor_z_half_span", "sensor_xy_half_span", "sensor_height", "gravity")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,11 +39,18 @@ class MMPAParameters:
         Side a of the square mover plate [m].
     plate_thickness, youngs_modulus, poisson_ratio, plate_density : float
         Aluminium plate [m], [Pa], [-], [kg/m3].
-    damping : float
-        Modal damping of every flexible mode [-].
+    damping : float or tuple of float
+        Modal damping of every flexible mode [-]; a tuple holds that of the first modes one by one, and its last value
+        goes on.
+    mass_heights : bool
+        Whether plate, magnets and mirror bars have their masses at their real heights, with the rotary inertia about
+        horizontal axes and the coupling of horizontal motion with tilt that follow from it. The published benchmark
+        lumps all of it at the neutral plane.
     bar_mass, bar_inset, bar_clearance, bar_points : float, float, float, int
         Two mirror bars along the +x and +y edges: mass of each [kg], distance of its centre line to the edge [m],
         clearance at its ends [m], number of points its mass is lumped on.
+    bar_height : float
+        Height of the mirror bars, which stand on the plate [m]; the horizontal beams hit them.
     remanence, magnet_density, magnet_height : float
         NdFeB: [T], [kg/m3], [m].
     pole_pitch : float
@@ -72,6 +80,9 @@ class MMPAParameters:
         Continuous derivatives of the weights.
     travel : float
         P = [-travel, travel] squared [m].
+    point_of_control : (float, float, float)
+        x and y in the frame, and height above the top face of the plate, of the point whose motion counts [m]. The
+        substrate lies on the plate, so the surface that is exposed is its top face.
     sensor_z_half_span, sensor_xy_half_span, sensor_height : float
         z-beams at (+-, +-) this [m]; outer horizontal beams at +- this [m]; height of the horizontal beams above
         the neutral plane [m].
@@ -98,11 +109,13 @@ class MMPAParameters:
     youngs_modulus: float = 70e9
     poisson_ratio: float = 0.33
     plate_density: float = 2700.0
-    damping: float = 0.008
+    damping: float | tuple[float, ...] = 0.008
+    mass_heights: bool = False
     bar_mass: float = 0.40
     bar_inset: float = 0.006
     bar_clearance: float = 0.005
     bar_points: int = 30
+    bar_height: float = 0.016
     remanence: float = 1.35
     magnet_density: float = 7600.0
     magnet_height: float = 0.010
@@ -129,6 +142,7 @@ class MMPAParameters:
     window_long: tuple[float, float] = (0.153, 0.194)
     window_order: int = 2
     travel: float = 0.060
+    point_of_control: tuple[float, float, float] = (0.0, 0.0, 0.0)
     sensor_z_half_span: float = 0.080
     sensor_xy_half_span: float = 0.080
     sensor_height: float = 0.012
@@ -138,22 +152,7 @@ class MMPAParameters:
     def __post_init__(self) -> None:
         for field in fields(self):
             self._check(field.name, getattr(self, field.name))
-        if not 0.0 < self.poisson_ratio < 0.5:
-            raise DomainError(f"poisson_ratio is {self.poisson_ratio}, wanted a value between 0 and 0.5.")
-        if not self.magnet_fill < 1.0:
-            raise DomainError(f"magnet_fill is {self.magnet_fill}, wanted tau_m / tau below 1.")
-        if self.field_taper > self.side / 2:
-            raise DomainError(f"field_taper is {self.field_taper} m, wanted at most side / 2 = {self.side / 2} m.")
-        if 2 * self.bundle_width >= min(self.coil_short, self.coil_long):
-            raise DomainError(f"bundle_width is {self.bundle_width} m: the coil has no opening. Make it narrower.")
-        if self.ritz_degree < 2:
-            raise DomainError(f"ritz_degree is {self.ritz_degree}, wanted at least 2 (below, the plate cannot bend).")
-        reach = self.travel + max(self.sensor_z_half_span, self.sensor_xy_half_span)
-        if reach > self.side / 2:
-            raise DomainError(
-                f"travel + beam position is {reach:.4g} m: a beam leaves the mover of half side {self.side / 2:.4g} m. "
-                "Reduce travel, sensor_z_half_span or sensor_xy_half_span."
-            )
+        check_parameters(self)
 
     def _check(self, name: str, value: Any) -> None:
         if name in ("window_short", "window_long"):
@@ -161,6 +160,20 @@ class MMPAParameters:
             if not 0.0 <= inner < outer:
                 raise DomainError(f"{name} is {value!r}, wanted two distances 0 <= inner < outer [m].")
             object.__setattr__(self, name, (inner, outer))
+            return
+        if name == "point_of_control":
+            x, y, z = (float(c) for c in finite_array(name, value, (3,)))
+            object.__setattr__(self, name, (x, y, z))
+            return
+        if name == "damping":
+            values = finite_array(name, value)
+            if values.ndim > 1 or values.size == 0 or np.any((values < 0.0) | (values >= 1.0)):
+                raise DomainError(f"damping is {value!r}, wanted damping ratios from 0 to below 1: one, or a tuple.")
+            object.__setattr__(self, name, tuple(values.tolist()) if values.ndim else float(values))
+            return
+        if name == "mass_heights":
+            if not isinstance(value, bool):
+                raise DomainError(f"mass_heights is {value!r}, wanted True or False.")
             return
         if isinstance(value, bool | str) or not np.isscalar(value) or not np.isreal(value):
             raise DomainError(f"{name} is {value!r}, wanted a number.")
@@ -195,6 +208,27 @@ class MMPAParameters:
         """Heights z of the mid-planes of the upper and the lower coil layer, from the neutral plane [m]."""
         top = self.magnet_bottom - self.gap - self.bundle_height / 2
         return top, top - self.bundle_height - self.layer_spacing
+
+    @property
+    def beam_top(self) -> float:
+        """Height z of the upper edge of the mirror bars, from the neutral plane [m]."""
+        return self.plate_thickness / 2 + self.bar_height
+
+    @property
+    def point_height(self) -> float:
+        """Height z of the point of control from the neutral plane [m]."""
+        return self.plate_thickness / 2 + self.point_of_control[2]
+
+    def damping_of(self, n: int) -> Array:
+        """Damping ratios of the first `n` flexible modes, (n,).
+
+        Examples
+        --------
+        >>> MMPAParameters(damping=(0.002, 0.004)).damping_of(4).tolist()
+        [0.002, 0.004, 0.004, 0.004]
+        """
+        given = np.atleast_1d(np.asarray(self.damping, dtype=float))[:n]
+        return np.concatenate([given, np.full(n - len(given), given[-1] if n else 0.0)])
 
     @property
     def n_coils(self) -> int:

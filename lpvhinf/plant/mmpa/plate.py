@@ -35,8 +35,12 @@ class RitzPlate:
 
     .. math::
 
-        K(v, w) = D \int (1 - \nu)\, \nabla^2 v : \nabla^2 w + \nu\, \Delta v\, \Delta w, \qquad
-        M(v, w) = \rho h \int v w + \sum_k m_k\, v(r_k)\, w(r_k)
+        K(v, w) &= D \int (1 - \nu)\, \nabla^2 v : \nabla^2 w + \nu\, \Delta v\, \Delta w \\
+        M(v, w) &= \int \rho h\, v w + \rho_2 \nabla v \cdot \nabla w
+                 + \sum_k m_k\, [\, v w + z_k^2\, \nabla v \cdot \nabla w\,](r_k)
+
+    A mass at the height z above the neutral plane moves by :math:`-z \nabla w` sideways as the plate tilts, which is
+    the second part of M.
 
     Parameters
     ----------
@@ -51,14 +55,19 @@ class RitzPlate:
     degree : int
         Degree of the polynomials in x and in y.
     masses, places : (n,), (n, 2)
-        Lumped masses [kg] and where they sit [m]; they add mass, no stiffness and no rotary inertia.
+        Lumped masses [kg] and where they sit [m]; they add mass, no stiffness.
+    heights : (n,), optional
+        Heights of the lumped masses above the neutral plane [m]; zero if left out.
+    rotary_density : float
+        Second moment of the plate's own mass over its thickness, per area, rho_2 = rho h^3 / 12 [kg]; zero leaves the
+        rotary inertia out, as Kirchhoff's theory does.
 
     Raises
     ------
     DomainError
         If a number is not positive or not finite, a mass is negative, or a place is off the plate.
     DimensionError
-        If `places` is not (n, 2).
+        If `places` is not (n, 2), or `heights` not (n,).
 
     Examples
     --------
@@ -77,6 +86,8 @@ class RitzPlate:
     degree: int
     masses: Array = field(default_factory=lambda: np.zeros(0))
     places: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    heights: Array | None = None
+    rotary_density: float = 0.0
     M: Array = field(init=False, repr=False)
     K: Array = field(init=False, repr=False)
 
@@ -97,7 +108,11 @@ class RitzPlate:
         if np.any(np.abs(places) > self.side / 2 * (1 + 1e-12)):
             raise DomainError(f"places reach {np.abs(places).max()} m, wanted at most side / 2 = {self.side / 2} m.")
         object.__setattr__(self, "masses", read_only(masses))
+        heights = np.zeros(len(masses)) if self.heights is None else finite_array("heights", self.heights, masses.shape)
+        if not 0.0 <= self.rotary_density < np.inf:
+            raise DomainError(f"rotary_density is {self.rotary_density} kg, wanted a finite number of at least 0.")
         object.__setattr__(self, "places", read_only(places))
+        object.__setattr__(self, "heights", read_only(heights))
         n, h = self.degree + 1, self.side / 2
         t, weights = legendre.leggauss(n + 1)  # exact for products of the polynomials
         tables = [legendre_table(t, self.degree, k) / h**k for k in range(3)]
@@ -111,6 +126,11 @@ class RitzPlate:
         K += 2.0 * (1.0 - self.poisson) * np.kron(I11, I11)
         rows = self.rows(places)
         M = self.area_density * np.kron(I00, I00) + rows.T @ (masses[:, None] * rows)
+        M += self.rotary_density * (np.kron(I11, I00) + np.kron(I00, I11))
+        if np.any(heights):
+            for direction in ((1, 0), (0, 1)):
+                slopes = self.rows(places, direction)
+                M += slopes.T @ ((masses * heights**2)[:, None] * slopes)
         K *= self.stiffness
         object.__setattr__(self, "M", read_only(0.5 * (M + M.T)))
         object.__setattr__(self, "K", read_only(0.5 * (K + K.T)))

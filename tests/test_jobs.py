@@ -10,7 +10,7 @@ import pytest
 
 from lpvhinf.errors import SynthesisError
 from lpvhinf.progress import Progress
-from studies.jobs import run_jobs
+from lpvhinf.jobs import run_jobs
 
 
 class Recorder(Progress):

@@ -31,7 +31,7 @@ from numpy.polynomial import legendre
 
 from lpvhinf.checks import Array, read_only
 from lpvhinf.plant.mmpa.coils import CoilLayer
-from lpvhinf.plant.mmpa.magnets import FirstHarmonicField
+from lpvhinf.plant.mmpa.magnetics.first_harmonic import FirstHarmonicField
 from lpvhinf.plant.mmpa.plate import legendre_table
 
 TABLE_DEGREE = 63  # of the Legendre series that are integrated; their tails are at round-off
