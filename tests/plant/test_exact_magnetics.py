@@ -1,4 +1,4 @@
-"""The exact magnetics against sources of another kind: forces of magpylib, linked flux, shifted coils, scaled magnets."""
+"""The exact magnetics against magpylib's forces, the linked flux, shifted coils and scaled magnets."""
 
 from __future__ import annotations
 
@@ -46,9 +46,7 @@ def assembly(magnets: MagnetArray, lift: Array | None = None, slopes: Array | No
     ):
         turn = Rotation.from_rotvec([w_y, -w_x, 0.0])
         place = np.array([*c, up]) + turn.apply([0.0, 0.0, Z])  # about the neutral plane
-        made.append(
-            magpylib.magnet.Cuboid(polarization=pol, dimension=size, position=place, orientation=turn * TURN)
-        )
+        made.append(magpylib.magnet.Cuboid(polarization=pol, dimension=size, position=place, orientation=turn * TURN))
     return made
 
 
@@ -142,7 +140,7 @@ def test_positions_shift_the_coils(coils: TabulatedWrench):
     assert wrench.shape == (1, 3 + PLATE.n_ritz, 160)
     for layer, start in ((0, 0), (1, 80)):
         offsets = LAYERS[layer].centres - p
-        assert wrench[0, :, start : start + 80].T == pytest.approx(wrench_at(coils, layer, offsets), abs=1e-12)
+        assert pytest.approx(wrench_at(coils, layer, offsets), abs=1e-12) == wrench[0, :, start : start + 80].T
 
 
 def test_coils_far_from_the_mover_do_nothing(coils: TabulatedWrench):
