@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,19 +11,24 @@ from numpy.typing import ArrayLike
 from lpvhinf.checks import Array, finite_array, points_in_box, positive, read_only, whole_number
 from lpvhinf.codesign.assembly import ARCHITECTURES, Assembly
 from lpvhinf.codesign.design import Design
-from lpvhinf.codesign.positions import design_positions, norms_at, worst_position
+from lpvhinf.codesign.positions import design_positions, plant_family
 from lpvhinf.codesign.specification import Specification
 from lpvhinf.codesign.starts import observer_starts, rigid_starts
 from lpvhinf.decoupling import DecoupledPlant
 from lpvhinf.errors import DomainError
 from lpvhinf.hinfstruct import HinfstructResult, hinfstruct
+from lpvhinf.hinfstruct.continuum import hinfstruct_over_box
 from lpvhinf.progress import SILENT, Progress
+from lpvhinf.statespace.generalized import GeneralizedPlant
 
 # The bundle's trust region can shrink on kinks far from a minimum: the solver starts again from where it ended as
 # long as that pays.
 MAX_PASSES = 2
 PASS_GAIN = 0.005
 DESCENT_TOLERANCE = 1e-3
+# Positions that the solver sees at once, unless more are asked for; and climbs of each search for a worse one.
+MAX_ACTIVE = 15
+N_REFINE = 3
 
 Checkpoint = Callable[[Array, float], None]
 
@@ -52,7 +57,8 @@ def codesign(
     r"""Minimise the largest :math:`\|M(p)\|_\infty` over P with the structure diag(K_RB, L, xi).
 
     The norm counts at a set of design positions, with the plant model itself. Positions found to be
-    worse join the set and the design goes on, until none is worse by `exchange_tolerance`.
+    worse join the set, positions that do not matter leave it if it grows beyond 15, and the design goes on,
+    until none is worse by `exchange_tolerance`. If the rounds run out the best of them counts.
 
     Parameters
     ----------
@@ -120,14 +126,24 @@ def codesign(
         else points_in_box(positions, decoupled.box, name="positions")
     )
 
-    def solve(initial: list[Array], passes: int) -> HinfstructResult:
-        plants = assembly.generalized_plants(active)
+    if architecture == "output-observer" and warm_start is None and rigid_start is None:
+        warm_start = codesign(
+            decoupled, "rigid-body", spec, positions=active, exchange_rounds=0, n_search=1, seed=seed,
+            max_iterations=max_iterations, tolerance=tolerance, time_limit=time_limit, progress=progress,
+        )  # fmt: skip
+    begin = _initial(assembly, active, warm_start, rigid_start, starts)
+    progress.stage(f"{architecture}: {len(active)} positions, {assembly.structure.n_parameters} parameters")
+    passes = [MAX_PASSES]
+
+    def solve(plants: Sequence[GeneralizedPlant], points: Array, initial: Sequence[Array] | None) -> HinfstructResult:
+        """Solve at the design positions; several passes in the first round only."""
         best: HinfstructResult | None = None
-        for _ in range(passes):
+        begins = list(begin if initial is None else initial)
+        for _ in range(passes.pop() if passes else 1):
             result = hinfstruct(
                 plants,
                 assembly.structure,
-                initial=initial,
+                initial=begins,
                 starts=0,
                 seed=seed,
                 jobs=jobs,
@@ -140,36 +156,33 @@ def codesign(
             )
             if best is not None and result.gamma > (1.0 - PASS_GAIN) * best.gamma:
                 return min(best, result, key=lambda r: r.gamma)
-            best, initial = result, [np.asarray(result.parameters)]
+            best, begins = result, [np.asarray(result.parameters)]
         assert best is not None
         return best
 
-    if architecture == "output-observer" and warm_start is None and rigid_start is None:
-        warm_start = codesign(
-            decoupled, "rigid-body", spec, positions=active, exchange_rounds=0, n_search=1, seed=seed,
-            max_iterations=max_iterations, tolerance=tolerance, time_limit=time_limit, progress=progress,
-        )  # fmt: skip
-    initial = _initial(assembly, active, warm_start, rigid_start, starts)
-    progress.stage(f"{architecture}: {len(active)} positions, {assembly.structure.n_parameters} parameters")
-    result = solve(initial, MAX_PASSES)
-    for round_number in range(exchange_rounds + 1):
-        progress.stage(f"{architecture}: worst position over P")
-        worst = worst_position(assembly, result.parameters, n_search=n_search, seed=seed + 1)
-        progress.log(f"{architecture}: gamma {result.gamma:.4f} at the design positions, {worst.gamma:.4f} over P")
-        new = worst.candidates[worst.gammas > (1.0 + exchange_tolerance) * result.gamma]
-        if len(new) == 0 or round_number == exchange_rounds:
-            break
-        active = np.vstack([active, new])
-        result = solve([np.asarray(result.parameters)], 1)
-    gammas = norms_at(assembly, result.parameters, active)
-    beyond = worst.gamma > np.max(gammas)
+    found = hinfstruct_over_box(
+        plant_family(assembly),
+        assembly.structure,
+        solve,
+        positions=active,
+        max_active=MAX_ACTIVE,
+        max_rounds=exchange_rounds + 1,
+        tolerance=exchange_tolerance,
+        n_search=n_search,
+        n_refine=N_REFINE,
+        seed=seed,
+        initial=begin,
+        progress=progress,
+    )
+    result = found.result
+    assert result.worst_position is not None
     return Design(
         assembly=assembly,
         parameters=read_only(result.parameters),
-        positions=read_only(active),
-        gammas=read_only(gammas),
-        gamma_worst=max(worst.gamma, float(np.max(gammas))),
-        worst_position=read_only(worst.position if beyond else active[int(np.argmax(gammas))]),
+        positions=read_only(found.positions),
+        gammas=read_only(result.gammas),
+        gamma_worst=result.gamma_worst,
+        worst_position=read_only(result.worst_position),
         optimality=result.optimality,
         status=result.status,
         seconds=time.monotonic() - began,

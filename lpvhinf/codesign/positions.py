@@ -6,14 +6,13 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.optimize
 
 from lpvhinf.checks import Array
 from lpvhinf.codesign.assembly import Assembly
 from lpvhinf.fitting import spread_points
 from lpvhinf.hinfstruct import hinf_norm
-
-UNSTABLE = 1e9  # what the simplex search gets for an infinite norm
+from lpvhinf.hinfstruct.plant_families import FrozenFamily
+from lpvhinf.hinfstruct.position_search import worst_over_box
 
 
 def design_positions(box: Array, n: int, *, seed: int = 0) -> Array:
@@ -37,7 +36,11 @@ class WorstPosition:
     candidates : (k, n_p)
         The worst positions that lie apart from each other, worst first.
     gammas : (k,)
+        Exact norms there.
     n_evaluated : int
+        Exact norms.
+    n_tracked : int
+        Norms by tracked peaks.
     """
 
     gamma: float
@@ -45,6 +48,12 @@ class WorstPosition:
     candidates: Array
     gammas: Array
     n_evaluated: int
+    n_tracked: int
+
+
+def plant_family(assembly: Assembly) -> FrozenFamily:
+    """The synthesis problem with the plant model itself over P."""
+    return FrozenFamily(assembly.generalized_plants, assembly.plant.box)
 
 
 def norms_at(assembly: Assembly, theta: Array, points: Array) -> Array:
@@ -54,44 +63,26 @@ def norms_at(assembly: Assembly, theta: Array, points: Array) -> Array:
 
 
 def worst_position(
-    assembly: Assembly, theta: Array, *, n_search: int = 128, n_refine: int = 3, seed: int = 1
+    assembly: Assembly,
+    theta: Array,
+    *,
+    n_search: int = 128,
+    n_refine: int = 3,
+    seed: int = 1,
+    known: Array | None = None,
 ) -> WorstPosition:
-    """Search P for the largest norm: an even spread, then a simplex search from the worst that lie apart.
+    """Search P for the largest norm, with the plant model itself; see `worst_over_box`.
 
     The value is a lower bound on the supremum over P, not a certificate.
     """
-    box = assembly.plant.box
-    width = box[:, 1] - box[:, 0]
-    points = spread_points(box, n_search, seed)
-    gammas = norms_at(assembly, theta, points)
-    apart: list[int] = []
-    for i in np.argsort(-gammas):
-        if all(np.max(np.abs(points[i] - points[j]) / width) > 0.1 for j in apart):
-            apart.append(int(i))
-        if len(apart) == n_refine:
-            break
-    found_at, found, count = [], [], n_search
-    for i in apart:
-        if not np.isfinite(gammas[i]):
-            found_at.append(points[i])
-            found.append(float(gammas[i]))
-            continue
-        step = 0.03 * width * np.where(points[i] > np.mean(box, axis=1), -1.0, 1.0)
-        simplex = np.vstack([points[i], points[i] + np.diag(step)])
-        search = scipy.optimize.minimize(
-            lambda p: -min(float(norms_at(assembly, theta, np.clip(p, box[:, 0], box[:, 1])[None])[0]), UNSTABLE),
-            points[i],
-            method="Nelder-Mead",
-            bounds=box,
-            options={"initial_simplex": simplex, "maxfev": 30, "xatol": 1e-4 * float(np.min(width)), "fatol": 1e-4},
-        )
-        count += int(search.nfev)
-        reached = np.inf if -search.fun >= UNSTABLE else -float(search.fun)
-        better = reached > gammas[i]
-        found_at.append(np.clip(search.x, box[:, 0], box[:, 1]) if better else points[i])
-        found.append(reached if better else float(gammas[i]))
-    order = np.argsort(-np.array(found))
-    candidates, values = np.array(found_at)[order], np.array(found)[order]
+    found = worst_over_box(
+        plant_family(assembly), assembly.structure, theta, n_search=n_search, n_refine=n_refine, seed=seed, known=known
+    )
     return WorstPosition(
-        gamma=float(values[0]), position=candidates[0], candidates=candidates, gammas=values, n_evaluated=count
+        gamma=found.gamma,
+        position=found.position,
+        candidates=found.candidates,
+        gammas=found.gammas,
+        n_evaluated=found.n_exact,
+        n_tracked=found.n_cheap,
     )

@@ -27,8 +27,11 @@ class ClosedLoops:
     ) -> None:
         self.structure, self.points = structure, points
         self.factories = [LoopFactory(plant, structure.n_x) for plant in plants]
+        self.n_states = structure.n_x + max(P.n_x for P in plants)
         self.scale = max(float(np.max(np.abs(np.linalg.eigvals(P.A)), initial=1e-3)) for P in plants)
         self._scheduled = any(p is not None for p in points)
+        self._constant: dict[int, Array] | None = None
+        self._looked = False
 
     def gains(self, theta: Array) -> list[Array]:
         """The augmented gain of every plant."""
@@ -36,8 +39,36 @@ class ClosedLoops:
             return [augmented_gain(*self.structure.realize(theta, None))] * len(self.factories)
         return [augmented_gain(*self.structure.realize(theta, p)) for p in self.points]
 
+    @property
+    def affine(self) -> bool:
+        """True if the controller's matrices look affine in theta: their derivatives agree at random parameters.
+
+        It only decides whether second derivatives of the structure are computed for the models of the minimisers.
+        """
+        if not self._looked:
+            self._looked = True
+            rng = np.random.default_rng(0)
+            n = self.structure.n_parameters
+            samples = [rng.standard_normal(n) for _ in range(3)]
+            constant: dict[int, Array] = {}
+            for plant in range(len(self.factories) if self._scheduled else 1):
+                with np.errstate(over="ignore", invalid="ignore"):
+                    slopes = [self._differences(theta, plant) for theta in samples]
+                size = float(np.max(np.abs(slopes[0]), initial=1e-300))
+                if not all(np.max(np.abs(s - slopes[0]), initial=0.0) <= 1e-7 * size for s in slopes[1:]):
+                    return False
+                constant[plant] = np.mean(slopes, axis=0)
+            self._constant = constant
+        return self._constant is not None
+
     def directions(self, theta: Array, plant: int) -> Array:
-        """Derivatives of the augmented gain by central differences, (n_parameters, n_K + n_u, n_K + n_y)."""
+        """Derivatives of the augmented gain, (n_parameters, n_K + n_u, n_K + n_y)."""
+        if self.affine:
+            assert self._constant is not None
+            return self._constant[plant if self._scheduled else 0]
+        return self._differences(theta, plant)
+
+    def _differences(self, theta: Array, plant: int) -> Array:
         p = self.points[plant]
         out = []
         for k in range(theta.size):
@@ -49,6 +80,8 @@ class ClosedLoops:
 
     def bend(self, theta: Array, plant: int, G: Array) -> Array:
         """Second derivative of the inner product of G with the augmented gain, by differences of the pullback."""
+        if self.affine:
+            return np.zeros((theta.size, theta.size))
         rows = []
         for k in range(theta.size):
             step = np.zeros_like(theta)

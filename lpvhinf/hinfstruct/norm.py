@@ -79,7 +79,7 @@ def exact_norm(
     lower, omega = float(peaks.sigma[0]), float(peaks.omega[0])
     if A.shape[0] == 0 or lower == 0.0:
         return NormResult(norm=lower, omega=omega)
-    proposal = _slicot_peak(A, B, C, D)
+    proposal = slicot_peak(A, B, C, D)
     if proposal is not None:
         gain, frequency = proposal
         value = float(largest_sigma(T.at(np.array([frequency])))[0])
@@ -98,7 +98,7 @@ def exact_norm(
     return NormResult(norm=lower, omega=omega)
 
 
-def _slicot_peak(A: Array, B: Array, C: Array, D: Array) -> tuple[float, float] | None:
+def slicot_peak(A: Array, B: Array, C: Array, D: Array) -> tuple[float, float] | None:
     """Norm and peak frequency by AB13DD, or None without slycot or after a failure."""
     try:
         import slycot

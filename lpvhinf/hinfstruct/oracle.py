@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
 
 import numpy as np
 
@@ -14,71 +12,27 @@ from lpvhinf.hinfstruct.closed_loops import ClosedLoops
 from lpvhinf.hinfstruct.curvature import log_gain_hessian
 from lpvhinf.hinfstruct.gradient import PeakGain, directions, peak_gain
 from lpvhinf.hinfstruct.loop import ClosedLoop
-from lpvhinf.hinfstruct.norm import NormResult, above_level, exact_norm
+from lpvhinf.hinfstruct.metric import OFF_AXIS, SLOW, loop_metric
+from lpvhinf.hinfstruct.norm import NormResult, above_level, exact_norm, slicot_peak
 from lpvhinf.hinfstruct.peaks import Peaks, find_peaks
+from lpvhinf.hinfstruct.problem import Budget as Budget
+from lpvhinf.hinfstruct.problem import Cut as Cut
+from lpvhinf.hinfstruct.problem import Oracle as Oracle
+from lpvhinf.hinfstruct.problem import Point as Point
 from lpvhinf.hinfstruct.response import Response
 
 #: Norms below this count as zero (their logarithm must stay finite).
 SMALLEST = 1e-10
+#: Parameters beyond this count as infinite.
+LARGEST = 1e9
+#: Loops of up to so many states are cheaper to evaluate by the exact norm than by peaks.
+SMALL = 20
+#: Frequencies that differ by less, relatively, are one.
+CLOSE = 1e-4
 
 
 @dataclass(slots=True, eq=False)
-class Point:
-    """Parameters with the value of the function there; infinite outside its domain."""
-
-    theta: Array
-    value: float
-    data: Any = None
-
-
-@dataclass(slots=True, eq=False)
-class Cut:
-    """One smooth function: value and gradient at a point, and what it is.
-
-    Below the maximum; where `hard`, one that a step must keep at or below zero.
-    """
-
-    value: float
-    gradient: Array
-    label: tuple[Any, ...]
-    hard: bool = False
-
-
-class Oracle(Protocol):
-    """What the minimisers ask of a maximum of smooth functions."""
-
-    def evaluate(self, theta: Array, cutoff: float = np.inf) -> Point:
-        """The value; above `cutoff` any number above it will do."""
-
-    def gradient(self, point: Point) -> Array:
-        """Gradient of the function that is the maximum."""
-
-    def confirm(self, point: Point) -> Point:
-        """The point with its value checked by exact means."""
-
-    def cuts(self, point: Point, missed: Sequence[Point] = ()) -> list[Cut]:
-        """The functions near the maximum; those that decided at the points `missed` too."""
-
-    def hessian(self, point: Point, weights: Sequence[float], cuts: Sequence[Cut]) -> Array | None:
-        """Weighted sum of the Hessians of cuts at a point; None if not available."""
-
-
-@dataclass(slots=True)
-class Budget:
-    """Wall time and a count of evaluations."""
-
-    deadline: float = np.inf
-    evaluations: int = 0
-    started: float = field(default_factory=time.monotonic)
-
-    @property
-    def spent(self) -> bool:
-        """True if the time is over."""
-        return time.monotonic() >= self.deadline
-
-
-@dataclass(slots=True, eq=False)
-class _Models:
+class Models:
     """What is known of the closed loops at a point."""
 
     loops: list[ClosedLoop | None]
@@ -86,6 +40,20 @@ class _Models:
     peaks: list[Peaks | None]
     decisive: int = -1
     top: float = 0.0
+    hessians: dict[tuple[int, float, bytes], Array] = field(default_factory=dict)
+
+    def response(self, i: int) -> Response:
+        """The response of loop i, factorised when first asked for."""
+        response, loop = self.responses[i], self.loops[i]
+        if response is None:
+            assert loop is not None
+            response = self.responses[i] = Response(loop.A, loop.B, loop.C, loop.D)
+        return response
+
+    def height(self, i: int) -> float:
+        """The highest peak known of loop i."""
+        peaks = self.peaks[i]
+        return 0.0 if peaks is None else float(peaks.sigma[0])
 
 
 class NormOracle:
@@ -95,7 +63,8 @@ class NormOracle:
               + \tfrac{\mu}{2} \log(1 + \|\theta\|^2)
 
     and infinity where a loop is not Hurwitz. The logarithm tames the huge norms of poor starts; the offset delta
-    makes f regular where the norm falls to zero; the guard mu keeps early iterations from infinite gains.
+    makes f regular where the norm falls to zero; the guard mu keeps early iterations from infinite gains. A single
+    small loop is evaluated by its exact norm; else peaks are tracked and accepted steps tested.
 
     Parameters
     ----------
@@ -127,6 +96,7 @@ class NormOracle:
         self._order = list(range(n))
         self._turn = 0
         self._scale = loops.scale
+        self._small = n == 1 and loops.n_states <= SMALL
 
     def _value(self, theta: Array, top: float) -> float:
         return float(np.log(max(top, SMALLEST) + self.offset) + 0.5 * self.guard * np.log1p(theta @ theta))
@@ -140,31 +110,32 @@ class NormOracle:
         return float(point.data.top) if point.data is not None else np.inf
 
     def evaluate(self, theta: Array, cutoff: float = np.inf) -> Point:
-        """The value by tracked peaks; the plants that decided last come first, and end a hopeless trial early."""
+        """The value; the plants that decided last come first, and end a hopeless trial early."""
         self.budget.evaluations += 1
         n = len(self._order)
-        models = _Models([None] * n, [None] * n, [None] * n)
+        models = Models([None] * n, [None] * n, [None] * n)
         top = 0.0
+        if np.max(np.abs(theta), initial=0.0) > LARGEST:
+            return Point(theta, np.inf)
         cutoff += 1e-12 * (1.0 + abs(cutoff))
         with np.errstate(over="ignore", invalid="ignore"):
             gains = self.loops.gains(theta)
-        if not all(np.all(np.isfinite(K)) for K in gains):
-            return Point(theta, np.inf)
+            if not all(np.all(np.isfinite(K)) for K in gains):
+                return Point(theta, np.inf)
         for rank, i in enumerate(self._order):
             loop = self.loops.factories[i].close(gains[i])
             if loop is None or not np.all(np.isfinite(loop.A)):
                 self._promote(rank)
                 return Point(theta, np.inf)
+            models.loops[i] = loop
             try:
-                response = Response(loop.A, loop.B, loop.C, loop.D)
+                peaks = self._peaks(models, i, top)
             except np.linalg.LinAlgError:
                 return Point(theta, np.inf)
-            if response.abscissa >= 0.0:
+            if peaks is None:
                 self._promote(rank)
                 return Point(theta, np.inf)
-            extra = np.concatenate([self._hints[i], self._missed[i]])
-            peaks = find_peaks(response, extra=extra, fraction=0.98, floor=top)
-            models.loops[i], models.responses[i], models.peaks[i] = loop, response, peaks
+            models.peaks[i] = peaks
             if peaks.sigma[0] > top or models.decisive < 0:
                 top, models.decisive = float(peaks.sigma[0]), i
             if self._value(theta, top) > cutoff:
@@ -173,39 +144,52 @@ class NormOracle:
         models.top = top
         return Point(theta, self._value(theta, top), models)
 
+    def _peaks(self, models: Models, i: int, floor: float) -> Peaks | None:
+        """Highest peaks of loop i, None if it is not stable."""
+        loop = models.loops[i]
+        assert loop is not None
+        if self._small and loop.A.shape[0]:
+            if np.max(np.linalg.eigvals(loop.A).real) >= 0.0:
+                return None
+            self.budget.exact += 1
+            found = slicot_peak(loop.A, loop.B, loop.C, loop.D)
+            if found is not None:
+                return Peaks(np.array([found[1]]), np.array([found[0]]))
+        response = models.response(i)
+        if response.abscissa >= 0.0:
+            return None
+        extra = np.concatenate([self._hints[i], self._missed[i]])
+        return find_peaks(response, extra=extra, fraction=0.98, floor=floor)
+
     def _promote(self, rank: int) -> None:
         self._order.insert(0, self._order.pop(rank))
 
-    def _gain(self, point: Point, plant: int, omega: float, cluster: float) -> PeakGain:
-        loop = point.data.loops[plant]
-        return peak_gain(loop, omega, cluster)
-
     def gradient(self, point: Point) -> Array:
         """Gradient of the logarithm of the highest peak."""
-        models: _Models = point.data
+        models: Models = point.data
         i = models.decisive
-        peaks = models.peaks[i]
-        assert peaks is not None
-        gain = self._gain(point, i, float(peaks.omega[0]), 0.0)
-        one = np.ones(1, dtype=complex)
-        pulled = self.loops.pullback(point.theta, i, gain.gradient(one))
+        peaks, loop = models.peaks[i], models.loops[i]
+        assert peaks is not None and loop is not None
+        gain = peak_gain(loop, float(peaks.omega[0]))
+        pulled = self.loops.pullback(point.theta, i, gain.gradient(np.ones(1, dtype=complex)))
         return np.asarray(pulled / (max(gain.sigma[0], SMALLEST) + self.offset) + self._guard_gradient(point.theta))
 
     def confirm(self, point: Point) -> Point:
         """Level tests on the plants near the maximum and on one more in turn; missed peaks are remembered."""
-        models: _Models = point.data
-        if models.top <= 2.0 * SMALLEST:
+        models: Models = point.data
+        if models.top <= 2.0 * SMALLEST or self._small:
             return point
         known = [i for i, peaks in enumerate(models.peaks) if peaks is not None]
-        heights = {i: float(models.peaks[i].sigma[0]) for i in known}  # type: ignore[union-attr]
+        heights = {i: models.height(i) for i in known}
         top = max(heights.values())
         near = sorted((i for i in known if heights[i] >= 0.9 * top), key=lambda i: -heights[i])[:3]
         self._turn = (self._turn + 1) % len(self._order)
         if self._turn in known and self._turn not in near:
             near.append(self._turn)
         for i in near:
-            loop, response = models.loops[i], models.responses[i]
-            assert loop is not None and response is not None
+            loop, response = models.loops[i], models.response(i)
+            assert loop is not None
+            self.budget.exact += 1
             found = above_level(loop.A, loop.B, loop.C, loop.D, response, top * (1.0 + 1e-6))
             if found.size:
                 finite = found[np.isfinite(found)]
@@ -223,33 +207,39 @@ class NormOracle:
         point.value = self._value(point.theta, top)
         return point
 
-    def cuts(self, point: Point, missed: Sequence[Point] = ()) -> list[Cut]:
-        """Every peak above the fraction, at each the cluster of singular values; then the missed frequencies."""
-        models: _Models = point.data
+    def cuts(self, point: Point, missed: Sequence[Point] = (), earlier: Sequence[Cut] = ()) -> list[Cut]:
+        """Every peak above the fraction, at each the cluster of singular values; missed and earlier frequencies too.
+
+        A peak may merge with its neighbour for a step and part from it in the next one: a model without the second
+        peak would step into it again and again.
+        """
+        models: Models = point.data
         top = models.top
         out: list[Cut] = []
         seen: dict[int, Array] = {}
-        for i, response in enumerate(models.responses):
-            peaks_i = models.peaks[i]
-            assert response is not None and peaks_i is not None
-            if peaks_i.sigma[0] < self.fraction * top:
+        for i, known in enumerate(models.peaks):
+            assert known is not None
+            if known.sigma[0] < self.fraction * top:
                 continue
-            extra = np.concatenate([self._hints[i], self._missed[i]])
-            peaks = find_peaks(response, extra=extra, fraction=0.0, floor=self.fraction * top)
+            extra = np.concatenate([self._hints[i], self._missed[i], known.omega])
+            peaks = find_peaks(models.response(i), extra=extra, fraction=0.0, floor=self.fraction * top)
             seen[i] = peaks.omega
             for omega in peaks.omega:
                 out += self._cuts_at(point, i, float(omega), self.cluster)
+        wanted = [(cut.label[0], float(cut.label[1])) for cut in earlier if not cut.hard]
         for other in missed:
-            if other.data is None:
-                continue
-            i = other.data.decisive
-            for omega in other.data.peaks[i].omega[:3]:
-                if i not in seen or not np.any(np.isclose(seen[i], omega, rtol=1e-6)):
-                    out += self._cuts_at(point, i, float(omega), 0.02)
+            if other.data is not None and other.data.decisive >= 0:
+                i = other.data.decisive
+                wanted += [(i, float(omega)) for omega in other.data.peaks[i].omega[:3]]
+        for i, omega in wanted:
+            if i not in seen or not np.any(np.isclose(seen[i], omega, rtol=CLOSE, atol=0.0)):
+                out += self._cuts_at(point, i, omega, 0.02)
+                seen[i] = np.append(seen.get(i, np.zeros(0)), omega)
         return out + self._poles_at_risk(point)
 
     def _cuts_at(self, point: Point, plant: int, omega: float, cluster: float) -> list[Cut]:
-        gain = self._gain(point, plant, omega, cluster)
+        loop = point.data.loops[plant]
+        gain: PeakGain = peak_gain(loop, omega, cluster)
         out = []
         for c in directions(gain.sigma, 0.03):
             value = gain.value(c)
@@ -260,40 +250,51 @@ class NormOracle:
 
     def _poles_at_risk(self, point: Point) -> list[Cut]:
         """Poles near the axis: a step may use nine tenths of their distance."""
-        models: _Models = point.data
+        models: Models = point.data
         out = []
-        for i, response in enumerate(models.responses):
-            loop = models.loops[i]
-            assert response is not None and loop is not None
+        for i, loop in enumerate(models.loops):
+            response = models.response(i)
+            assert loop is not None
             if response.left is None or response.right is None:
                 continue
             poles = response.poles
-            risky = np.flatnonzero((poles.imag >= 0.0) & (-poles.real < 0.02 * np.abs(poles) + 1e-3 * self._scale))
+            risky = np.flatnonzero((poles.imag >= 0.0) & (-poles.real < OFF_AXIS * np.abs(poles) + SLOW * self._scale))
             for k in risky[np.argsort(-poles.real[risky])][:4]:
                 G = np.outer(response.left[k] @ loop.Bi, loop.Ci @ response.right[:, k]).real
                 gradient = self.loops.pullback(point.theta, i, G) / -poles[k].real
                 out.append(Cut(-0.9, gradient, (i, complex(poles[k])), hard=True))
         return out
 
-    def hessian(self, point: Point, weights: Sequence[float], cuts: Sequence[Cut]) -> Array | None:
-        """Exact Hessian of the weighted sum of logarithms of peaks; the guard is left out."""
-        models: _Models = point.data
+    def hessians(self, point: Point, cuts: Sequence[Cut]) -> Array | None:
+        """Exact Hessians of the logarithms of peaks; zero for hard cuts, and the guard is left out."""
+        models: Models = point.data
         n = point.theta.size
-        out = np.zeros((n, n))
-        pushed: dict[int, Array] = {}
-        for plant in {cut.label[0] for cut in cuts}:
+        out = np.zeros((len(cuts), n, n))
+        for k, cut in enumerate(cuts):
+            if cut.hard:
+                continue
+            plant, omega, c = cut.label
+            key = (plant, omega, c.tobytes())
+            if key in models.hessians:
+                out[k] = models.hessians[key]
+                continue
+            loop = models.loops[plant]
+            assert loop is not None
             dK = self.loops.directions(point.theta, plant)
-            G = np.zeros(dK.shape[1:])
-            for weight, cut in zip(weights, cuts, strict=True):
-                if cut.label[0] == plant:
-                    loop = models.loops[plant]
-                    assert loop is not None
-                    part, gradient = log_gain_hessian(loop, cut.label[1], cut.label[2], dK, self.offset)
-                    out += weight * part
-                    G += weight * gradient
-            pushed[plant] = G
-        for plant, G in pushed.items():
-            out += self.loops.bend(point.theta, plant, G)
+            part, G = log_gain_hessian(loop, omega, c, dK, self.offset)
+            out[k] = models.hessians[key] = part + self.loops.bend(point.theta, plant, G)
+        return out
+
+    def metric(self, point: Point) -> Array | None:
+        """How far a step moves the loops near the maximum, see `loop_metric`."""
+        models: Models = point.data
+        out = np.zeros((point.theta.size, point.theta.size))
+        for i, peaks in enumerate(models.peaks):
+            loop = models.loops[i]
+            if peaks is None or loop is None or models.height(i) < self.fraction * models.top:
+                continue
+            dK = self.loops.directions(point.theta, i)
+            out += loop_metric(loop, models.response(i), peaks.omega, dK, self._scale)
         return out
 
     def exact(self, theta: Array) -> list[NormResult]:
@@ -301,6 +302,7 @@ class NormOracle:
         out = []
         for i, (factory, K) in enumerate(zip(self.loops.factories, self.loops.gains(theta), strict=True)):
             loop = factory.close(K)
+            self.budget.exact += 1
             if loop is None:
                 out.append(NormResult(norm=np.inf, omega=np.nan))
             else:

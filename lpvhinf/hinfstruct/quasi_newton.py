@@ -8,21 +8,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from lpvhinf.checks import Array
-from lpvhinf.hinfstruct.oracle import Budget, Oracle, Point
+from lpvhinf.hinfstruct.metric import unit_steps
+from lpvhinf.hinfstruct.problem import Budget, Oracle, Point
 
 ARMIJO, WOLFE = 1e-4, 0.5
 #: Longest step, relative to theta.
 REACH = 1.0
+#: Trials of a line search.
+TRIALS = 30
 
 
 @dataclass(slots=True, eq=False)
 class Descent:
-    """Where a minimiser ended: the point, the reason, its iterations and its optimality measure."""
+    """Where a minimiser ended: the point, the reason, its iterations, its optimality measure and trust region."""
 
     point: Point
     reason: str
     iterations: int
     optimality: float = np.inf
+    radius: float | None = None
 
 
 def weak_wolfe(
@@ -37,7 +41,7 @@ def weak_wolfe(
     slope = float(start @ direction)
     low, high, t = 0.0, np.inf, min(1.0, longest)
     best: tuple[Point, Array] | None = None
-    for _ in range(40):
+    for _ in range(TRIALS):
         limit = point.value + ARMIJO * t * slope
         trial = oracle.evaluate(point.theta + t * direction, limit)
         if trial.value <= limit:
@@ -62,6 +66,15 @@ def weak_wolfe(
     return (None, None, False) if best is None else (*best, False)
 
 
+def first_hessian(oracle: Oracle, point: Point) -> Array:
+    """Inverse Hessian to begin with: that of the oracle's metric, else the identity."""
+    M = oracle.metric(point)
+    if M is None or not np.all(np.isfinite(M)):
+        return np.eye(point.theta.size)
+    F = unit_steps(M)
+    return np.asarray(F @ F.T)
+
+
 def bfgs(
     oracle: Oracle,
     start: Point,
@@ -77,17 +90,16 @@ def bfgs(
 
     BFGS with a weak Wolfe line search converges to nonsmooth minimisers in practice:
     the inverse Hessian learns the directions in which the maximum has a kink.
-    It ends below `target`, when the value fell by less than `tolerance` in `window`
-    iterations, or when no descent is found along two steepest directions in turn.
+    It begins with the oracle's metric. It ends below `target`, when the value fell by less than `tolerance` in
+    `window` iterations, or when no descent is found along two steepest directions in turn.
 
     References
     ----------
     Lewis and Overton (2013), Mathematical Programming 141, 135-163.
     """
     point = start
-    n = point.theta.size
     gradient = oracle.gradient(point)
-    H = np.eye(n)
+    H = first_hessian(oracle, point)
     fresh = True
     values = [point.value]
     for iteration in range(max_iterations):
@@ -100,7 +112,7 @@ def bfgs(
         if not np.isfinite(slope) or slope >= -1e-14 * np.linalg.norm(direction) * np.linalg.norm(gradient):
             if fresh:
                 return Descent(point, "zero gradient", iteration)
-            H, fresh = np.eye(n), True
+            H, fresh = first_hessian(oracle, point), True
             continue
         size = float(np.linalg.norm(direction))
         reach = max(1.0, float(np.linalg.norm(point.theta)))
@@ -112,13 +124,14 @@ def bfgs(
         if trial is None or new_gradient is None:
             if fresh:
                 return Descent(point, "no descent", iteration)
-            H, fresh = np.eye(n), True
+            H, fresh = first_hessian(oracle, point), True
             continue
         step, change = trial.theta - point.theta, new_gradient - gradient
         product = float(step @ change)
         if curved and product > 1e-14 * np.linalg.norm(step) * np.linalg.norm(change):
             if fresh:
-                H = np.eye(n) * (product / float(change @ change))
+                # of the right size along this step
+                H = H * (product / float(change @ H @ change))
                 fresh = False
             left = step / product
             Hy = H @ change

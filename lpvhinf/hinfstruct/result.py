@@ -23,6 +23,8 @@ class PhaseRecord:
         "stabilise", "descend" or "polish".
     evaluations : int
         Function evaluations of this phase.
+    exact : int
+        Exact norms and level tests of this phase, one a plant.
     seconds : float
         Wall time of this phase.
     gamma : float
@@ -34,9 +36,29 @@ class PhaseRecord:
     start: int
     phase: str
     evaluations: int
+    exact: int
     seconds: float
     gamma: float
     reason: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluations:
+    """What a run cost.
+
+    Attributes
+    ----------
+    trials : int
+        Parameters at which the function was evaluated: trial steps of all phases and starts.
+    exact : int
+        Exact norms and level tests, one a plant. A single small loop is evaluated by its exact norm only.
+    every_model : int
+        Exact norms that a solver takes which evaluates every plant at each of these trials.
+    """
+
+    trials: int
+    exact: int
+    every_model: int
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -68,6 +90,7 @@ class HinfstructResult:
     status : str
         How the run ended and what may be done about it.
     history : tuple of PhaseRecord
+    evaluations : Evaluations
     stabilizing : bool
         Every closed loop is Hurwitz.
     """
@@ -83,6 +106,7 @@ class HinfstructResult:
     optimality: float
     status: str
     history: tuple[PhaseRecord, ...]
+    evaluations: Evaluations
     stabilizing: bool
 
     def __repr__(self) -> str:

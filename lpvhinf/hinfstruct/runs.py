@@ -11,7 +11,9 @@ import numpy as np
 from lpvhinf.checks import Array
 from lpvhinf.hinfstruct.bundle import bundle
 from lpvhinf.hinfstruct.closed_loops import ClosedLoops
-from lpvhinf.hinfstruct.oracle import SMALLEST, Budget, NormOracle, Point
+from lpvhinf.hinfstruct.metric import unit_steps
+from lpvhinf.hinfstruct.oracle import SMALLEST, NormOracle
+from lpvhinf.hinfstruct.problem import Budget, Point
 from lpvhinf.hinfstruct.quasi_newton import bfgs
 from lpvhinf.hinfstruct.result import PhaseRecord
 from lpvhinf.hinfstruct.stabilise import AbscissaOracle, stabilise
@@ -20,17 +22,31 @@ from lpvhinf.statespace.generalized import GeneralizedPlant
 
 #: Random draws of one start until one can be stabilised.
 DRAWS = 4
+#: Every fourth random start is larger by this factor: good minima may lie at large gains.
+LARGE = 10.0
+#: Scales of a random draw that are tried.
+SCALES = (1.0, 0.3, 0.1, 0.03, 0.01)
+#: Reasons that leave a polish open; optimality of a minimum; BFGS iterations and relative gain of another attempt.
+LIMITS, MINIMAL, RETRY, RETRY_GAIN = ("iteration limit", "time limit"), 1e-3, 100, 1e-4
 #: Guard mu against infinite gains, in the first descent of every other random start.
 GUARD = 0.02
 #: A first descent ends this much earlier than the second one.
 EARLIER = 3.0
+
+#: Asked between evaluations; a worker process puts the interruption of its caller here.
+stopped: Callable[[], bool] | None = None
 
 Listener = Callable[[str, Array, float], None]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Task:
-    """Everything a worker needs; `theta` None means a random start."""
+    """Everything a worker needs; `theta` None means a random start.
+
+    A descent begins at `theta`, moved at random by `kick` unit steps of the metric; a polish has the trust region of
+    `radius` at first (None: the usual one), takes at most `iterations`, and with `anew` begins by BFGS and the usual
+    trust region.
+    """
 
     plants: tuple[GeneralizedPlant, ...]
     structure: ControllerStructure
@@ -42,11 +58,18 @@ class Task:
     max_iterations: int
     tolerance: float
     descent_tolerance: float
+    kick: float = 0.0
+    iterations: int = 150
+    radius: float | None = None
+    anew: bool = False
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(slots=True, kw_only=True, eq=False)
 class Outcome:
-    """Where a start ended: its norm (infinite if not stabilised), or the spectral abscissa."""
+    """Where a start ended: its norm (infinite if not stabilised), or the spectral abscissa.
+
+    `finished` where a polish would not gain more; else `radius` is that of the trust region, to go on with.
+    """
 
     start: int
     theta: Array
@@ -55,10 +78,12 @@ class Outcome:
     optimality: float
     reason: str
     history: tuple[PhaseRecord, ...]
+    finished: bool = False
+    radius: float | None = None
 
 
 def _budget(task: Task) -> Budget:
-    return Budget(deadline=time.monotonic() + task.seconds)
+    return Budget(deadline=time.monotonic() + task.seconds, stop=stopped)
 
 
 def _record(task: Task, phase: str, budget: Budget, gamma: float, reason: str) -> PhaseRecord:
@@ -66,6 +91,7 @@ def _record(task: Task, phase: str, budget: Budget, gamma: float, reason: str) -
         start=task.start,
         phase=phase,
         evaluations=budget.evaluations,
+        exact=budget.exact,
         seconds=time.monotonic() - budget.started,
         gamma=gamma,
         reason=reason,
@@ -79,12 +105,16 @@ def descend(task: Task, listen: Listener | None = None) -> Outcome:
     rng = np.random.default_rng([task.seed, task.start])
     theta = task.structure.initial(rng) if task.theta is None else task.theta
     margin = 1e-7 * loops.scale
+    if task.kick > 0.0:
+        theta = _kicked(loops, theta, task.kick, rng)
 
     best = AbscissaOracle(loops, budget).evaluate(theta)
     reason = "stable already"
     for draw in range(DRAWS if task.theta is None else 1):
         if draw:
             theta = task.structure.initial(rng)
+        if task.theta is None:
+            theta = _scaled(loops, (LARGE if task.start % 4 == 3 else 1.0) * theta, budget)
         run = stabilise(
             loops,
             theta,
@@ -112,7 +142,7 @@ def descend(task: Task, listen: Listener | None = None) -> Outcome:
 
     if best.value >= 0.0:
         return outcome(best.theta, np.inf, reason)
-    budget = Budget(deadline=budget.deadline)
+    budget = Budget(deadline=budget.deadline, stop=stopped)
     theta, gamma = best.theta, np.inf
     # every other random start is kept from infinite gains at first: both ways find minima that the other misses
     guards = (GUARD if task.theta is None and task.start % 2 == 0 else 0.0, 0.0)
@@ -136,33 +166,69 @@ def descend(task: Task, listen: Listener | None = None) -> Outcome:
     return outcome(theta, gamma, reason)
 
 
+def _scaled(loops: ClosedLoops, theta: Array, budget: Budget) -> Array:
+    """The largest of several scales at which theta stabilises; else that of the smallest abscissa."""
+    oracle = AbscissaOracle(loops, budget)
+    tried = []
+    for scale in SCALES:
+        point = oracle.evaluate(scale * theta)
+        if point.value < 0.0:
+            return point.theta
+        tried.append(point)
+    return min(tried, key=lambda point: point.value).theta
+
+
+def _kicked(loops: ClosedLoops, theta: Array, size: float, rng: np.random.Generator) -> Array:
+    """A random step of a size in the metric at theta."""
+    oracle = NormOracle(loops, Budget())
+    point = oracle.evaluate(theta)
+    M = oracle.metric(point) if point.data is not None else None
+    step = rng.standard_normal(theta.size)
+    step *= size / np.linalg.norm(step)
+    return np.asarray(theta + (step if M is None else unit_steps(M) @ step))
+
+
 def _heard(oracle: NormOracle, listen: Listener | None, phase: str) -> Callable[[Point], None] | None:
     return None if listen is None else (lambda point: listen(phase, point.theta, oracle.gamma(point)))
 
 
 def polish(task: Task, listen: Listener | None = None) -> Outcome:
-    """Bundle / SQP from a stabilising theta."""
+    """Bundle / SQP from a stabilising theta; where it stalls off a minimum, BFGS and a new trust region try again."""
     assert task.theta is not None
     budget = _budget(task)
     loops = ClosedLoops(task.plants, task.structure, task.points)
     first = NormOracle(loops, budget)
     gamma = first.gamma(first.evaluate(task.theta))
-    oracle = NormOracle(loops, budget, offset=gamma)
-    run = bundle(
-        oracle,
-        oracle.confirm(oracle.evaluate(task.theta)),
-        budget,
-        max_iterations=task.max_iterations,
-        tolerance=task.tolerance,
-        accepted=_heard(oracle, listen, "polish"),
-    )
-    gamma = oracle.gamma(run.point)
+    theta, radius, left, anew = task.theta, task.radius, task.iterations, task.anew
+    while True:
+        oracle = NormOracle(loops, budget, offset=gamma)
+        heard = _heard(oracle, listen, "polish")
+        if anew:
+            begin = oracle.confirm(oracle.evaluate(theta))
+            again = bfgs(oracle, begin, budget, max_iterations=RETRY, tolerance=RETRY_GAIN, window=15, accepted=heard)
+            theta, radius, gamma = again.point.theta, None, oracle.gamma(again.point)
+            oracle = NormOracle(loops, budget, offset=gamma)
+            heard = _heard(oracle, listen, "polish")
+        start = oracle.confirm(oracle.evaluate(theta))
+        run = bundle(
+            oracle, start, budget, max_iterations=left, tolerance=task.tolerance, radius=radius, accepted=heard
+        )
+        gained = gamma - oracle.gamma(run.point)
+        left -= run.iterations
+        limited = run.reason in LIMITS
+        stalled = radius is None and gained <= RETRY_GAIN * gamma
+        theta, radius, gamma = run.point.theta, run.radius, oracle.gamma(run.point)
+        if limited or left <= 0 or run.optimality <= MINIMAL or stalled:
+            break
+        anew = True
     return Outcome(
         start=task.start,
-        theta=run.point.theta,
+        theta=theta,
         gamma=gamma,
         abscissa=-np.inf,
         optimality=run.optimality * (gamma + oracle.offset) / max(gamma, SMALLEST),
         reason=run.reason,
         history=(_record(task, "polish", budget, gamma, run.reason),),
+        finished=not limited,
+        radius=radius,
     )

@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import time
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
-from lpvhinf.checks import Array, finite_array, positive, read_only
-from lpvhinf.errors import DimensionError, DomainError, SynthesisError
+from lpvhinf.checks import Array, positive, read_only, whole_number
+from lpvhinf.errors import DomainError, SynthesisError
+from lpvhinf.hinfstruct.arguments import checked_initial, checked_plants, checked_positions
 from lpvhinf.hinfstruct.closed_loops import ClosedLoops
-from lpvhinf.hinfstruct.oracle import SMALLEST, Budget, NormOracle
-from lpvhinf.hinfstruct.result import HinfstructResult, PhaseRecord
-from lpvhinf.hinfstruct.runs import Outcome, Task, descend, polish
+from lpvhinf.hinfstruct.fixed_modes import check_movable, named
+from lpvhinf.hinfstruct.oracle import SMALL, NormOracle
+from lpvhinf.hinfstruct.problem import Budget
+from lpvhinf.hinfstruct.result import Evaluations, HinfstructResult
+from lpvhinf.hinfstruct.runner import Checkpoint, Runner
+from lpvhinf.hinfstruct.runs import Outcome, Task
+from lpvhinf.hinfstruct.search import Pool, search
 from lpvhinf.hinfstruct.structures import ControllerStructure, realize_checked
 from lpvhinf.progress import SILENT, Progress
 from lpvhinf.statespace.generalized import GeneralizedPlant
 
-Checkpoint = Callable[[Array, float], None]
-
-#: Starts whose norm is above this multiple of the best one are not polished.
-HOPELESS = 1.5
+#: Parameters larger than this multiple of one point to a minimum at infinity.
+HUGE = 1e5
 
 
 def hinfstruct(
@@ -34,14 +34,14 @@ def hinfstruct(
     *,
     constraints: Sequence[object] = (),
     points: ArrayLike | None = None,
-    starts: int = 3,
+    starts: int | None = None,
     seed: int = 0,
     initial: ArrayLike | Sequence[ArrayLike] | None = None,
     time_limit: float | None = None,
     progress: Progress = SILENT,
     checkpoint: Checkpoint | None = None,
     jobs: int = 1,
-    max_iterations: int = 300,
+    max_iterations: int = 1000,
     tolerance: float = 1e-7,
     descent_tolerance: float = 1e-2,
 ) -> HinfstructResult:
@@ -53,9 +53,13 @@ def hinfstruct(
     The problem is nonsmooth and nonconvex: the result is a local minimum, the best
     over the starts. Phases: (0) the largest real part of the closed-loop poles is
     minimised until all plants are stable; (1) BFGS with a weak Wolfe line search;
-    (2) a bundle / SQP polish over all near-maximal peaks. Trial steps rely on tracked
-    peaks, accepted steps pass a Hamiltonian level test, and the result is recomputed by
-    the exact norm on every plant.
+    (2) a bundle of quadratic cuts over all near-maximal peaks, with a trust region measured by what a step does to
+    the loop, so that units and the size of the gain do not matter. Trial steps rely on tracked
+    peaks (on the exact norm for a single small loop), accepted steps pass a Hamiltonian level test, and the result is
+    recomputed by the exact norm on every plant.
+
+    Ctrl-C ends the run: the best controller so far is returned, and its `status` says "interrupted". A minimum that
+    lies at infinite parameters is approached up to 1e9, and the status tells.
 
     Parameters
     ----------
@@ -67,8 +71,10 @@ def hinfstruct(
         Must be empty in this version.
     points : (n_plants, n_p), optional
         Positions handed to a scheduled structure as `p`, one a plant.
-    starts : int
-        Random starts besides `initial`.
+    starts : int, optional
+        Random starts besides `initial`: all are stabilised and descend, the better ones are polished in rounds of
+        successive halving, the best one to the end. Left out: batches of starts, and of perturbations of the best
+        point, until four agree on the best minimum or an effort (a few thousand evaluations) is spent.
     seed : int
         The same seed gives the same result, with any number of jobs, as long as no time limit cuts in.
     initial : (n_parameters,) or a sequence of these, optional
@@ -83,7 +89,7 @@ def hinfstruct(
     jobs : int
         Processes for the starts. Above one, call from under ``if __name__ == "__main__":``.
     max_iterations : int
-        Of each phase.
+        Of each phase of a start.
     tolerance : float
         Relative decrease of gamma that counts as progress in the polish.
     descent_tolerance : float
@@ -96,6 +102,10 @@ def hinfstruct(
         If sizes of plants, controller, points or initial parameters disagree.
     DomainError
         If a value is not finite, not positive where it must be, or an option is not supported.
+    AssumptionError
+        If an unstable mode of a plant is not controllable from u or not observable from y.
+    KeyboardInterrupt
+        If interrupted before any stabilising parameters were found.
     SynthesisError
         If no start stabilises every plant; its `.result` holds the best parameters reached.
 
@@ -116,28 +126,25 @@ def hinfstruct(
     >>> result.stabilizing, round(result.gamma, 4)
     (True, 2.7321)
     """
-    models = _plants(plants, controller)
-    positions = _positions(points, len(models))
-    given = _initial(initial, controller.n_parameters)
+    models = checked_plants(plants, controller)
+    positions = checked_positions(points, len(models))
+    given = checked_initial(initial, controller.n_parameters)
     if len(constraints) != 0:
         raise DomainError(
             f"constraints has {len(constraints)} entries, wanted (): hard constraints are not supported in this "
             "version. Put the goal into the performance channel with a weight."
         )
-    for name, value, least in (
-        ("starts", starts, 0 if given else 1),
-        ("seed", seed, 0),
-        ("jobs", jobs, 1),
-        ("max_iterations", max_iterations, 1),
-    ):
-        if not isinstance(value, (int, np.integer)) or value < least:
-            raise DomainError(f"{name} is {value!r}, wanted an integer of at least {least}.")
+    if starts is not None:
+        whole_number("starts", starts, 0 if given else 1)
+    for name, value, least in (("seed", seed, 0), ("jobs", jobs, 1), ("max_iterations", max_iterations, 1)):
+        whole_number(name, value, least)
     positive("tolerance", tolerance)
     positive("descent_tolerance", descent_tolerance)
     deadline = np.inf if time_limit is None else time.monotonic() + positive("time_limit", time_limit, "s")
     realize_checked(controller, given[0] if given else controller.initial(np.random.default_rng(seed)), positions[0])
+    check_movable(models)
 
-    def task(start: int, theta: Array | None, seconds: float) -> Task:
+    def make(start: int, theta: Array | None) -> Task:
         return Task(
             plants=models,
             structure=controller,
@@ -145,138 +152,70 @@ def hinfstruct(
             start=start,
             theta=theta,
             seed=seed,
-            seconds=seconds,
+            seconds=np.inf,
             max_iterations=max_iterations,
             tolerance=tolerance,
             descent_tolerance=descent_tolerance,
         )
 
-    begins: list[Array | None] = [*given, *([None] * starts)]
-    runner = _Runner(progress, checkpoint, jobs, deadline)
-    with threadpool_limits(limits=1):
-        outcomes = runner.map(descend, [task(k, theta, np.inf) for k, theta in enumerate(begins)], share=0.4)
-        best = min(outcome.gamma for outcome in outcomes)
-        if np.isfinite(best):
-            hopeful = sorted(
-                (o for o in outcomes if o.gamma <= max(HOPELESS * best, SMALLEST)), key=lambda o: (o.gamma, o.start)
-            )
-            polished = runner.map(polish, [task(o.start, o.theta, np.inf) for o in hopeful], share=1.0)
-        else:
-            polished = []
-        history = tuple(record for outcome in [*outcomes, *polished] for record in outcome.history)
-        oracle = NormOracle(ClosedLoops(models, controller, positions), Budget())
-        if not polished:
-            closest = min(outcomes, key=lambda o: (o.abscissa, o.start))
-            status = (
-                f"no start stabilises every plant: the smallest abscissa reached is {closest.abscissa:.4g} rad/s "
-                f"({closest.reason}). Check that the plants are stabilisable with this structure, raise starts, "
-                "max_iterations or time_limit, or pass a stabilising initial."
-            )
-            result = _result(oracle, closest, controller, positions, status, history)
-            raise SynthesisError(status, result)
+    loops = ClosedLoops(models, controller, positions)
+    oracle = NormOracle(loops, Budget())
+    cost = len(models) * (1.0 + (loops.n_states / SMALL) ** 2)
+    with threadpool_limits(limits=1), Runner(progress, checkpoint, jobs, deadline) as runner:
+        pool = search(runner, make, given, starts, cost, controller.n_parameters, max_iterations)
+        candidates = pool.ranked()[:3]
+        if runner.interrupted and runner.theta is not None:
+            candidates = [_heard(runner), *candidates]
         # tracked peaks rank the candidates, exact norms decide
-        ranked = sorted(polished, key=lambda o: (o.gamma, o.start))
-        results = [_result(oracle, o, controller, positions, _status(o), history) for o in ranked[:3]]
-    return min(results, key=lambda r: r.gamma)
+        results = [_result(oracle, o, controller, positions, _status(o, runner), pool) for o in candidates]
+        best = min(results, key=lambda r: r.gamma, default=None)
+        if best is not None and best.stabilizing:
+            return best
+        if runner.interrupted:
+            raise KeyboardInterrupt("interrupted before stabilising parameters were found")
+        closest = min(pool.latest.values(), key=lambda o: (o.abscissa, o.start))
+        status = _not_stabilised(loops, closest)
+        raise SynthesisError(status, _result(oracle, closest, controller, positions, status, pool))
 
 
-def _plants(
-    plants: GeneralizedPlant | Sequence[GeneralizedPlant], controller: ControllerStructure
-) -> tuple[GeneralizedPlant, ...]:
-    for name in ("n_u", "n_y", "n_x", "n_parameters", "realize", "pullback", "initial"):
-        if not hasattr(controller, name):
-            raise DomainError(
-                f"controller is {type(controller).__name__} without {name!r}, wanted an object that follows the "
-                "ControllerStructure protocol, such as StaticGain(n_u, n_y)."
-            )
-    models = (
-        (plants,) if isinstance(plants, GeneralizedPlant) else tuple(plants) if isinstance(plants, Sequence) else ()
+def _heard(runner: Runner) -> Outcome:
+    """The best point of an interrupted run."""
+    assert runner.theta is not None
+    return Outcome(
+        start=-1, theta=runner.theta, gamma=runner.best, abscissa=-np.inf, optimality=np.inf, reason="", history=()
     )
-    if not models or not all(isinstance(P, GeneralizedPlant) for P in models):
-        raise DomainError(
-            f"plants is {type(plants).__name__}, wanted a GeneralizedPlant or a sequence with at least one. "
-            "Convert a state space by GeneralizedPlant.from_control, or freeze an LPV plant at chosen positions."
+
+
+def _not_stabilised(loops: ClosedLoops, closest: Outcome) -> str:
+    """The message of a failure: how close it came, and which modes are in the way."""
+    modes = []
+    for i, (factory, K) in enumerate(zip(loops.factories, loops.gains(closest.theta), strict=True)):
+        loop = factory.close(K)
+        poles = np.linalg.eigvals(loop.A) if loop is not None else np.zeros(0)
+        unstable = poles[poles.real >= 0.0]
+        if unstable.size:
+            modes.append(f"plants[{i}]: {named(unstable)}")
+    where = "; ".join(modes[:5]) if modes else "poles too close to the axis"
+    return (
+        f"no start stabilises every plant: the smallest abscissa reached is {closest.abscissa:.4g} rad/s "
+        f"({closest.reason}), with the unstable closed-loop modes {where}. Check that the plants are stabilisable with "
+        "this structure, raise starts, max_iterations or time_limit, or pass a stabilising initial."
+    )
+
+
+def _status(outcome: Outcome, runner: Runner) -> str:
+    if runner.interrupted:
+        return (
+            "interrupted: the controller is the best so far, valid but not converged. Pass its parameters as initial "
+            "to go on."
         )
-    for i, P in enumerate(models):
-        if (P.n_u, P.n_y) != (controller.n_u, controller.n_y):
-            raise DimensionError(
-                f"plants[{i}] has n_u={P.n_u}, n_y={P.n_y}, but the controller has n_u={controller.n_u}, "
-                f"n_y={controller.n_y}. Make them equal."
-            )
-        if min(P.n_w, P.n_z) < 1:
-            raise DimensionError(f"plants[{i}] has n_w={P.n_w}, n_z={P.n_z}, wanted at least one of each.")
-    return models
-
-
-def _positions(points: ArrayLike | None, n: int) -> tuple[Array | None, ...]:
-    if points is None:
-        return (None,) * n
-    return tuple(read_only(row) for row in finite_array("points", points, (n, None)))
-
-
-def _initial(initial: ArrayLike | Sequence[ArrayLike] | None, n: int) -> list[Array]:
-    if initial is None:
-        return []
-    array = finite_array("initial", initial)  # type: ignore[arg-type]
-    if array.ndim == 1:
-        array = array[None]
-    if array.ndim != 2 or array.shape[1] != n or array.shape[0] < 1:
-        raise DimensionError(
-            f"initial has shape {array.shape}, wanted ({n},) or (starts, {n}), the controller's n_parameters."
+    size = float(np.max(np.abs(outcome.theta), initial=0.0))
+    if size > HUGE:
+        return (
+            f"the parameters grow without bound (largest {size:.2g}): the infimum seems to lie at infinite gain, and "
+            f"was approached within bounds ({outcome.reason}). Put a weight on u, or bound the parameters, for a "
+            "practical gain."
         )
-    return list(array.copy())
-
-
-class _Runner:
-    """Runs tasks here or in processes, shares the time, and keeps the best for the listeners."""
-
-    def __init__(self, progress: Progress, checkpoint: Checkpoint | None, jobs: int, deadline: float) -> None:
-        self.progress, self.checkpoint, self.jobs, self.deadline = progress, checkpoint, jobs, deadline
-        self.best = np.inf
-        self.iteration = 0
-
-    def map(self, work: Callable[..., Outcome], tasks: list[Task], share: float) -> list[Outcome]:
-        """Outcomes in the order of the tasks; all tasks together take at most `share` of the time left."""
-        end = time.monotonic() + share * (self.deadline - time.monotonic()) if np.isfinite(self.deadline) else np.inf
-        workers = min(self.jobs, len(tasks))
-        if workers == 1:
-            out = []
-            for k, task in enumerate(tasks):
-                self.progress.stage(f"{work.__name__} {k + 1} of {len(tasks)} (start {task.start})")
-                out.append(work(_limited(task, end, len(tasks) - k), self.hear))
-            return out
-        self.progress.stage(f"{work.__name__}, {len(tasks)} starts in {workers} processes", len(tasks))
-        waves = -(-len(tasks) // workers)
-        context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(workers, mp_context=context, initializer=_single_thread) as pool:
-            futures = [pool.submit(work, _limited(task, end, waves)) for task in tasks]
-            for future in futures:
-                outcome = future.result()
-                self.hear("", outcome.theta, outcome.gamma)
-            return [future.result() for future in futures]
-
-    def hear(self, phase: str, theta: Array, value: float) -> None:
-        """Pass on the norm (while stabilising: the abscissa) at theta; a better point goes to the checkpoint."""
-        self.iteration += 1
-        if phase == "stabilise":
-            self.progress.update(1, abscissa=value, iteration=self.iteration)
-            return
-        if value < self.best:
-            self.best = value
-            if self.checkpoint is not None:
-                self.checkpoint(theta.copy(), value)
-        self.progress.update(1, gamma=self.best, iteration=self.iteration)
-
-
-def _limited(task: Task, end: float, parts: int) -> Task:
-    return replace(task, seconds=max(0.0, (end - time.monotonic()) / parts))
-
-
-def _single_thread() -> None:
-    threadpool_limits(limits=1)
-
-
-def _status(outcome: Outcome) -> str:
     if outcome.reason == "time limit":
         return (
             "stopped by time_limit before convergence; the controller is valid. Raise time_limit, or pass its "
@@ -303,7 +242,7 @@ def _result(
     controller: ControllerStructure,
     positions: tuple[Array | None, ...],
     status: str,
-    history: tuple[PhaseRecord, ...],
+    pool: Pool,
 ) -> HinfstructResult:
     import control
 
@@ -322,6 +261,11 @@ def _result(
         lower_bound=None,
         optimality=outcome.optimality,
         status=status,
-        history=history,
+        history=tuple(pool.history),
+        evaluations=Evaluations(
+            trials=sum(r.evaluations for r in pool.history),
+            exact=sum(r.exact for r in pool.history) + oracle.budget.exact,
+            every_model=len(gammas) * sum(r.evaluations for r in pool.history if r.phase != "stabilise"),
+        ),
         stabilizing=bool(np.all(np.isfinite(gammas))),
     )

@@ -59,12 +59,16 @@ class AbscissaOracle:
         """Gradient of the rightmost pole."""
         return self._gradients(point, 0.0, 1)[0].gradient
 
-    def cuts(self, point: Point, missed: Sequence[Point] = ()) -> list[Cut]:
+    def cuts(self, point: Point, missed: Sequence[Point] = (), earlier: Sequence[Cut] = ()) -> list[Cut]:
         """The poles within a tenth of the spread behind the rightmost one."""
         spread = max(1e-6, 0.1 * abs(point.value))
         return self._gradients(point, spread, 6)
 
-    def hessian(self, point: Point, weights: Sequence[float], cuts: Sequence[Cut]) -> Array | None:
+    def hessians(self, point: Point, cuts: Sequence[Cut]) -> Array | None:
+        """Not available."""
+        return None
+
+    def metric(self, point: Point) -> Array | None:
         """Not available."""
         return None
 

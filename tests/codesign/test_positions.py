@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
 from lpvhinf.checks import Array
-from lpvhinf.codesign import Design, design_positions, worst_position
-from lpvhinf.codesign import positions as module
+from lpvhinf.codesign import Design, WorstPosition, design_positions, worst_position
 from lpvhinf.codesign.assembly import Assembly
 from lpvhinf.codesign.positions import norms_at
 from lpvhinf.codesign.starts import observer_starts, rigid_starts
+from lpvhinf.fitting import spread_points
+from lpvhinf.hinfstruct import StaticGain
+from lpvhinf.statespace.generalized import GeneralizedPlant
 
 BOX = np.array([[-0.2, 0.1], [1.0, 3.0]])
 
@@ -41,63 +45,76 @@ def test_the_first_positions_are_corners() -> None:
     assert design_positions(BOX[:1], 2).tolist() == [[-0.2], [0.1]]
 
 
-class Search:
-    """`norms_at` replaced by a function of p, with a record of what was evaluated."""
+class Model:
+    """An assembly whose plants have the norm gain(p) at p, out of reach of the controller, with a record."""
 
-    def __init__(self, function: Callable[[Array], float]) -> None:
-        self.function, self.points, self.values = function, list[Array](), list[float]()
+    def __init__(self, gain: Callable[[Array], float]) -> None:
+        self.gain, self.points, self.values = gain, list[Array](), list[float]()
+        self.structure = StaticGain(1, 1)
+        self.plant = SimpleNamespace(box=np.array([[-0.1, 0.1]]))
 
-    def __call__(self, assembly: Assembly, theta: Array, points: Array) -> Array:
-        values = [self.function(p) for p in points]
+    def generalized_plants(self, points: Array) -> list[GeneralizedPlant]:
+        zero = [[0.0]]
         self.points += list(points)
-        self.values += values
-        return np.array(values)
+        self.values += [self.gain(p) for p in points]
+        return [
+            # an infinite norm is a pole on the right
+            GeneralizedPlant([[1.0]], [[1.0]], zero, [[1.0]], zero, zero, zero, zero)
+            if np.isinf(self.gain(p))
+            else GeneralizedPlant([[-1.0]], [[self.gain(p)]], zero, [[1.0]], zero, zero, zero, zero)
+            for p in points
+        ]
 
 
-def test_the_search_climbs_to_a_narrow_peak(rigid: Design, monkeypatch: pytest.MonkeyPatch) -> None:
-    search = Search(lambda p: 1.0 + float(np.exp(-(((p[0] - 0.0317) / 0.01) ** 2))))
-    monkeypatch.setattr(module, "norms_at", search)
-    worst = worst_position(rigid.assembly, rigid.parameters, n_search=16)
-    assert worst.gamma == np.max(search.values)
-    assert worst.gamma == pytest.approx(2.0, rel=1e-4)
-    assert worst.position == pytest.approx([0.0317], abs=1e-4)
-    assert worst.n_evaluated == len(search.values)
-    assert np.all(np.abs(np.array(search.points)) <= 0.1)
+def search(model: Model, **options: int) -> WorstPosition:
+    return worst_position(cast("Assembly", model), np.zeros(1), **options)
 
 
-def test_candidates_are_apart_and_worst_first(rigid: Design, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "norms_at", Search(lambda p: 3.0 + float(np.cos(100.0 * p[0]))))
-    worst = worst_position(rigid.assembly, rigid.parameters, n_search=32, n_refine=3)
+def test_the_search_climbs_to_a_narrow_peak() -> None:
+    model = Model(lambda p: 1.0 + float(np.exp(-(((p[0] - 0.0317) / 0.01) ** 2))))
+    worst = search(model, n_search=16)
+    assert worst.gamma == pytest.approx(2.0, rel=1e-6)
+    assert worst.position == pytest.approx([0.0317], abs=1e-5)
+    assert worst.n_evaluated <= 4
+    assert worst.n_tracked >= 16
+    assert np.all(np.abs(np.array(model.points)) <= 0.1)
+
+
+def test_candidates_are_apart_and_worst_first() -> None:
+    worst = search(Model(lambda p: 3.0 + float(np.cos(100.0 * p[0]))), n_search=32, n_refine=3)
     assert len(worst.candidates) == len(worst.gammas) == 3
     assert np.all(np.diff(worst.gammas) <= 0.0)
     assert worst.gamma == worst.gammas[0]
     assert np.array_equal(worst.position, worst.candidates[0])
+    assert np.min(np.diff(np.sort(worst.candidates.ravel()))) > 0.06  # a period is 0.063
 
 
-def test_an_unstable_position_is_the_worst(rigid: Design, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "norms_at", Search(lambda p: np.inf if p[0] > 0.05 else 2.0))
-    worst = worst_position(rigid.assembly, rigid.parameters, n_search=16)
+def test_an_unstable_position_is_the_worst() -> None:
+    worst = search(Model(lambda p: np.inf if p[0] > 0.05 else 2.0), n_search=16)
     assert worst.gamma == np.inf
     assert worst.position[0] > 0.05
 
 
-def test_an_instability_that_the_climb_finds_is_infinite(rigid: Design, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A band that no position of the spread lies in, on the way up to its edge."""
-    spread = Search(lambda p: 2.0 + float(p[0]))
-    monkeypatch.setattr(module, "norms_at", spread)
-    worst_position(rigid.assembly, rigid.parameters, n_search=4, n_refine=1)
-    highest = max(float(p[0]) for p in spread.points[:4])
-    monkeypatch.setattr(module, "norms_at", Search(lambda p: np.inf if p[0] > highest + 1e-6 else 2.0 + float(p[0])))
-    assert worst_position(rigid.assembly, rigid.parameters, n_search=4, n_refine=1).gamma == np.inf
+def test_an_instability_that_the_climb_finds_is_infinite() -> None:
+    """A band that no position of the spread lies in, on the way up to a top."""
+    spread = Model(lambda p: 2.0 + float(p[0]) - 40.0 * max(0.0, float(p[0]) - 0.095))
+    search(spread, n_search=4, n_refine=1)
+    looked_at = np.array(spread.points).ravel()
+    assert np.max(looked_at[looked_at < 0.095]) > 0.09
+    seen = looked_at[:6]
+    highest = float(np.max(seen[seen < 0.095]))
+    banded = Model(lambda p: np.inf if highest + 1e-6 < p[0] < 0.095 else spread.gain(p))
+    assert search(banded, n_search=4, n_refine=1).gamma == np.inf
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_never_less_than_what_was_evaluated(observer: Design, monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
-    search = Search(lambda p: float(norms_at(observer.assembly, observer.parameters, p[None])[0]))
-    monkeypatch.setattr(module, "norms_at", search)
-    worst = worst_position(observer.assembly, observer.parameters, n_search=4, n_refine=1, seed=seed)
-    assert worst.gamma == np.max(search.values)
-    assert search.function(worst.position) == pytest.approx(worst.gamma, rel=1e-9)
+def test_the_value_is_the_exact_norm_at_the_position(observer: Design, seed: int) -> None:
+    worst = worst_position(observer.assembly, observer.parameters, n_search=4, n_refine=2, seed=seed)
+    exact = norms_at(observer.assembly, observer.parameters, worst.candidates)
+    assert exact == pytest.approx(worst.gammas, rel=1e-9)
+    assert worst.gamma == np.max(worst.gammas)
+    spread = norms_at(observer.assembly, observer.parameters, spread_points(observer.assembly.plant.box, 32))
+    assert worst_position(observer.assembly, observer.parameters, seed=seed).gamma >= np.max(spread) * (1.0 - 1e-9)
 
 
 def test_gamma_worst_of_a_design_covers_its_positions(rigid: Design, observer: Design) -> None:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from lpvhinf.checks import Array
-from lpvhinf.errors import DimensionError, DomainError, SynthesisError
+from lpvhinf.errors import AssumptionError, DimensionError, DomainError, SynthesisError
 from lpvhinf.hinfstruct import DiagonalGain, FixedOrder, HinfstructResult, StaticGain, hinf_norm, hinfstruct
 from lpvhinf.progress import Progress
 from lpvhinf.statespace.generalized import GeneralizedPlant
@@ -129,10 +133,96 @@ def test_a_plant_that_cannot_be_stabilised() -> None:
         [[0.0]],
         [[0.0]],
     )
-    with pytest.raises(SynthesisError, match="abscissa reached is 1 ") as caught:
+    with pytest.raises(AssumptionError, match=r"plants\[0\] is not stabilisable.* 1 rad/s"):
+        hinfstruct(plant, StaticGain(1, 1), starts=1)
+    dual = GeneralizedPlant(plant.A.T, plant.B1, plant.C2.T, plant.C1, plant.B2.T, plant.D11, plant.D12, plant.D21)
+    with pytest.raises(AssumptionError, match=r"not detectable.* 1 rad/s"):
+        hinfstruct(dual, StaticGain(1, 1), starts=1)
+
+
+def test_a_structure_that_cannot_stabilise_the_plant() -> None:
+    # an inverted pendulum with its angle alone: a static gain leaves undamped poles
+    plant = GeneralizedPlant(
+        [[0.0, 1.0], [1.0, 0.0]], [[0.0], [1.0]], [[0.0], [1.0]], [[1.0, 0.0]], [[1.0, 0.0]], [[0.0]], [[0.0]], [[0.0]]
+    )
+    with pytest.raises(SynthesisError, match=r"abscissa reached is .*unstable closed-loop modes") as caught:
         hinfstruct(plant, StaticGain(1, 1), starts=1)
     assert caught.value.result.stabilizing is False
     assert caught.value.result.gamma == np.inf
+
+
+class Stopper(Progress):
+    """Interrupts once a norm was heard, as Ctrl-C would."""
+
+    def __init__(self, phase: str = "gamma") -> None:
+        self.phase = phase
+
+    def update(self, advance: int = 1, **values: float) -> None:
+        if self.phase in values:
+            raise KeyboardInterrupt
+
+
+def test_interruption_returns_the_best_so_far() -> None:
+    result = hinfstruct(random_plant(3), StaticGain(2, 2), starts=3, progress=Stopper())
+    assert result.stabilizing
+    assert "interrupted" in result.status
+    assert result.gamma == pytest.approx(norms(result, [random_plant(3)])[0], rel=1e-9)
+
+
+def test_interruption_before_a_stabilising_controller_is_passed_on() -> None:
+    with pytest.raises(KeyboardInterrupt):
+        hinfstruct(first_order(), StaticGain(1, 1), initial=[5.0], starts=0, progress=Stopper("abscissa"))
+
+
+INTERRUPTED = """
+import os, signal, threading, numpy as np
+from lpvhinf import StaticGain, hinfstruct
+from lpvhinf.progress import Progress
+from tests.hinfstruct.plants import random_plant
+
+class Killer(Progress):
+    def stage(self, name, total=None):
+        threading.Timer(6.0, os.kill, (os.getpid(), signal.SIGINT)).start()
+
+if __name__ == "__main__":
+    plants = [random_plant(k, n=30) for k in range(8)]
+    result = hinfstruct(plants, StaticGain(2, 2), starts=40, jobs=2, max_iterations=1000, progress=Killer())
+    print(result.stabilizing, "interrupted" in result.status)
+    os._exit(0)
+"""
+
+
+@pytest.mark.slow
+def test_interruption_of_processes(tmp_path: Path) -> None:
+    script = tmp_path / "interrupted.py"
+    script.write_text(INTERRUPTED)
+    root = Path(__file__).resolve().parents[2]
+    done = subprocess.run(
+        [sys.executable, str(script)],
+        cwd=root,
+        env={**os.environ, "PYTHONPATH": str(root)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.stdout.split() == ["True", "True"], done.stderr
+
+
+def test_evaluations_are_counted() -> None:
+    plants = [random_plant(k) for k in range(6)]
+    result = hinfstruct(plants, StaticGain(2, 2), starts=2)
+    spent = result.evaluations
+    assert spent.every_model >= 6 * (
+        spent.trials - sum(r.evaluations for r in result.history if r.phase == "stabilise")
+    )
+    assert 0 < spent.exact < spent.every_model
+
+
+def test_default_starts_agree_on_the_minimum() -> None:
+    result = hinfstruct(with_noise(), StaticGain(1, 1))
+    assert result.gamma == pytest.approx(np.sqrt(2.0), rel=1e-6)
+    assert len({record.start for record in result.history}) >= 3
 
 
 def test_time_limit_is_respected() -> None:

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from lpvhinf.checks import Array
-from lpvhinf.hinfstruct.bundle import bundle, convex_model, quadratic_model, shortest_combination
-from lpvhinf.hinfstruct.oracle import Budget, Cut, Point
+from lpvhinf.hinfstruct.bundle import bundle
+from lpvhinf.hinfstruct.problem import Budget, Cut, Point
 from lpvhinf.hinfstruct.quasi_newton import bfgs
+from lpvhinf.hinfstruct.subproblem import convex_model, curved_step, quadratic_model, shortest_combination
 
 
 class MaxOfQuadratics:
@@ -20,6 +21,7 @@ class MaxOfQuadratics:
         rng = np.random.default_rng(seed)
         self.centres, self.offsets, self.wall = rng.standard_normal((m, n)), rng.standard_normal(m), wall
         roots = rng.standard_normal((m, n, n))
+        self.scale = 1.0
         self.H = roots @ roots.transpose(0, 2, 1) + 0.1 * np.eye(n)
 
     def parts(self, x: Array) -> tuple[Array, Array]:
@@ -37,11 +39,14 @@ class MaxOfQuadratics:
         values, gradients = self.parts(point.theta)
         return np.asarray(gradients[np.argmax(values)])
 
-    def cuts(self, point: Point, missed: Sequence[Point] = ()) -> list[Cut]:
+    def cuts(self, point: Point, missed: Sequence[Point] = (), earlier: Sequence[Cut] = ()) -> list[Cut]:
         return [Cut(float(v), g, (i,)) for i, (v, g) in enumerate(zip(*self.parts(point.theta), strict=True))]
 
-    def hessian(self, point: Point, weights: Sequence[float], cuts: Sequence[Cut]) -> Array | None:
-        return np.asarray(sum(w * self.H[cut.label[0]] for w, cut in zip(weights, cuts, strict=True)))
+    def hessians(self, point: Point, cuts: Sequence[Cut]) -> Array | None:
+        return self.H[[cut.label[0] for cut in cuts]]
+
+    def metric(self, point: Point) -> Array | None:
+        return self.scale * np.mean(self.H, axis=0)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -92,6 +97,29 @@ def test_quadratic_model_keeps_hard_rows() -> None:
     assert model is not None
     np.testing.assert_allclose(model.step, [0.5, 0.0], atol=1e-7)
     assert model.decrease == pytest.approx(0.5)
+
+
+def test_curved_step_follows_a_curved_kink() -> None:
+    # max(|x|^2 / 2 + x1, |x|^2 / 2 - x1) - x0 on a box: the minimum is (1, 0), where both are -1/2
+    G, H = np.array([[-1.0, 1.0], [-1.0, -1.0]]), np.array([np.eye(2), np.eye(2)])
+    step = curved_step(np.zeros(2), G, H, np.array([False, False]), np.array([0.5, 0.5]), 2.0)
+    assert step is not None
+    np.testing.assert_allclose(step.step, [1.0, 0.0], atol=1e-6)
+    assert step.decrease == pytest.approx(0.5)
+
+
+def test_curved_step_takes_negative_curvature_to_the_edge() -> None:
+    step = curved_step(np.zeros(1), np.array([[0.1]]), np.array([[[-1.0]]]), np.array([False]), np.ones(1), 0.5)
+    assert step is not None
+    np.testing.assert_allclose(step.step, [-0.5], atol=1e-6)
+
+
+@pytest.mark.parametrize("scale", [1e-8, 1e8])
+def test_bundle_does_not_depend_on_the_size_of_the_metric_alone(scale: float) -> None:
+    oracle = MaxOfQuadratics(2, 6, 5)
+    oracle.scale = scale
+    best = bundle(oracle, oracle.evaluate(np.full(6, 3.0)), Budget(), tolerance=1e-10)
+    assert best.optimality < 1e-4
 
 
 def test_convex_model_is_positive_semidefinite() -> None:

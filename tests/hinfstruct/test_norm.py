@@ -17,7 +17,7 @@ from lpvhinf.hinfstruct.response import Response, largest_sigma
 def method(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     """With SLICOT's proposal and without."""
     if request.param == "own":
-        monkeypatch.setattr(norm_module, "_slicot_peak", lambda *matrices: None)
+        monkeypatch.setattr(norm_module, "slicot_peak", lambda *matrices: None)
     return str(request.param)
 
 
@@ -64,12 +64,12 @@ def test_methods_agree_and_similarity_does_not_matter(seed: int, monkeypatch: py
     assert hinf_norm(np.linalg.solve(S, A @ S), np.linalg.solve(S, B), C @ S, D).norm == pytest.approx(
         reference, rel=1e-5
     )
-    monkeypatch.setattr(norm_module, "_slicot_peak", lambda *matrices: None)
+    monkeypatch.setattr(norm_module, "slicot_peak", lambda *matrices: None)
     assert hinf_norm(A, B, C, D).norm == pytest.approx(reference, rel=1e-7)
 
 
 def test_a_wrong_proposal_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(norm_module, "_slicot_peak", lambda *matrices: (99.0, 0.3))
+    monkeypatch.setattr(norm_module, "slicot_peak", lambda *matrices: (99.0, 0.3))
     result = hinf_norm([[0.0, 1.0], [-1.0, -0.02]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]])
     assert result.norm == pytest.approx(50.0025, rel=1e-6)
 

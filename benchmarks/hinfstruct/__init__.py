@@ -1,0 +1,1 @@
+"""Structured H-infinity synthesis on the COMPleib systems: ``python -m benchmarks.hinfstruct``."""
