@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lpvhinf.checks import Array, points_in_box
+from lpvhinf.checks import Array, points_in_box, whole_number
 from lpvhinf.codesign.assembly import Assembly
 from lpvhinf.errors import DomainError
+from lpvhinf.fitting import spread_points
 from lpvhinf.hinfstruct.uncertainty import (
     Coverage,
     UncertainPlant,
@@ -22,7 +23,7 @@ from lpvhinf.hinfstruct.uncertainty import (
     uncertain_plant,
     uncertainty_weight,
 )
-from lpvhinf.hinfstruct.uncertainty.deviation import resonance_grid
+from lpvhinf.hinfstruct.uncertainty.deviation import deviation, resonance_grid
 from lpvhinf.problems import Loop, four_block
 from lpvhinf.statespace.lpv import LPVStateSpace
 
@@ -45,12 +46,15 @@ class FlexibleUncertainty:
         The scaled rigid-body plant.
     omega : (n_omega,)
         rad/s, of the fit.
+    coverage : Coverage
+        At the positions of the check, at most one unless the exchange ran out of rounds.
     """
 
     problem: UncertainPlant
     weight: UncertaintyWeight
     nominal: System
     omega: Array
+    coverage: Coverage
 
     def covers(self, assembly: Assembly, points: ArrayLike, *, per_decade: int = 200) -> Coverage:
         """Compare the weight with the plant at other positions, between the ends of the fit's frequencies."""
@@ -69,7 +73,14 @@ def rigid_body_systems(assembly: Assembly, points: Array) -> list[System]:
 
 
 def flexible_uncertainty(
-    assembly: Assembly, points: ArrayLike, *, order: int = 4, margin: float = 1.1, per_decade: int = 20
+    assembly: Assembly,
+    points: ArrayLike,
+    *,
+    order: int = 4,
+    margin: float = 1.1,
+    per_decade: int = 20,
+    n_check: int = 128,
+    rounds: int = 5,
 ) -> FlexibleUncertainty:
     """The 4-block problem of a conventional design with the flexible modes as additive uncertainty.
 
@@ -82,7 +93,10 @@ def flexible_uncertainty(
     order, margin : int, float
         Of the weight, see `uncertainty_weight`.
     per_decade : int
-        Frequencies of the fit beside the resonances.
+        Frequencies of the fit beside the resonances; ten times as many at the check.
+    n_check, rounds : int
+        Positions of a spread over P that the weight is checked at; those beyond it join the fit, which is repeated
+        so many times at most.
 
     Raises
     ------
@@ -102,9 +116,22 @@ def flexible_uncertainty(
     nominal = (A[rigid, rigid], B[rigid], C[:, rigid], np.zeros((n, n)))
     low = BELOW * 2.0 * np.pi * float(np.min(assembly.scaling.f_bw))
     omega = resonance_grid(systems, low, ABOVE * float(np.max(plant.omega)), per_decade=per_decade)
-    weight = uncertainty_weight(nominal, systems, omega, order=order, margin=margin)
+    others = rigid_body_systems(assembly, spread_points(box, whole_number("n_check", n_check, 1), seed=1))
+    grid = resonance_grid(others, omega[0], omega[-1], per_decade=10 * per_decade)
+    sizes = deviation(nominal, others, grid)
+    for _ in range(whole_number("rounds", rounds, 1)):
+        weight = uncertainty_weight(nominal, systems, omega, order=order, margin=margin)
+        ratios = sizes / weight.magnitude(grid)
+        beyond = np.flatnonzero(np.max(ratios, axis=1) > 1.0)
+        if len(beyond) == 0:
+            break
+        # the worst position, and the worst at each frequency: neighbours are covered with them
+        worst = {int(k) for k in np.argmax(ratios, axis=0)} & {int(k) for k in beyond}
+        systems = systems + [others[k] for k in sorted(worst)]
     loop = Loop(plant=LPVStateSpace.from_system(nominal, box), filters=assembly.filters, n_rb=n)
     problem = four_block(loop).at(np.mean(box, axis=1))
     # w1 adds to the plant's output, w2 to its input
     uncertain = uncertain_plant(problem, weight, y=slice(0, n), enters_as=slice(0, n), adds=slice(n, 2 * n))
-    return FlexibleUncertainty(problem=uncertain, weight=weight, nominal=nominal, omega=omega)
+    return FlexibleUncertainty(
+        problem=uncertain, weight=weight, nominal=nominal, omega=omega, coverage=weight.covers(nominal, others, grid)
+    )

@@ -168,7 +168,9 @@ def hinfstruct(
             candidates = [_heard(runner), *candidates]
         # tracked peaks rank the candidates, exact norms decide
         results = [_result(oracle, o, controller, positions, _status(o, runner), pool) for o in candidates]
-        best = min(results, key=lambda r: r.gamma, default=None)
+        level = (1.0 + 1e-7) * min((r.gamma for r in results), default=np.inf)
+        # of equal ones that which is known best to be a minimum
+        best = min((r for r in results if r.gamma <= level), key=lambda r: (r.optimality, r.gamma), default=None)
         if best is not None and best.stabilizing:
             return best
         if runner.interrupted:

@@ -67,7 +67,7 @@ def compare_designs(
     *,
     starts: int = 3,
     seed: int = 0,
-    scaling_order: int = 0,
+    scaling_order: int = 1,
     n_search: int = 64,
     progress: Progress = SILENT,
     **options: Any,

@@ -85,10 +85,10 @@ def hinfstruct_robust(
     plants: UncertainPlant | Sequence[UncertainPlant],
     controller: ControllerStructure,
     *,
-    scaling_order: int = 0,
+    scaling_order: int = 1,
     scaling_frequency: float | None = None,
     initial: ArrayLike | None = None,
-    rounds: int = 5,
+    rounds: int = 6,
     tolerance: float = 0.01,
     starts: int = 3,
     seed: int = 0,
@@ -110,7 +110,8 @@ def hinfstruct_robust(
         The largest robust gain counts; equal channels.
     controller : ControllerStructure
     scaling_order : 0 or 1
-        Of D(s).
+        Of D(s). A constant one is cheaper to tune, and costs performance where the uncertainty is large in a band
+        only: 6.6 against 4.2 for a beam with three flexible modes.
     scaling_frequency : float, optional
         rad/s, where corners of D(s) start; default the peak of the nominal design's robust gain.
     initial : (n_parameters,), optional
@@ -194,7 +195,8 @@ def hinfstruct_robust(
         if not np.isfinite(found.gain):
             level *= RAISE
             continue
-        level = found.gain
+        # a little below what is reached: the scaling tends to settle at the level that it was tuned for
+        level = found.gain * float(np.sqrt(min(1.0, run.gamma)))
         if np.isfinite(before.gain) and found.gain > (1.0 - tolerance) * before.gain:
             status = (
                 "the robust gain settled at a local minimum. Raise starts or scaling_order to look for a better one."
