@@ -75,6 +75,7 @@ def test_an_unknown_study_is_refused(capsys: pytest.CaptureFixture[str]) -> None
         (TINY.replace("stability_grid = 15", "stability_grid = 0"), "stability_grid is 0, wanted a whole number"),
         (TINY.replace("degree = 20", "degree = -1"), "degree is -1, wanted a whole number of at least 0"),
         (TINY.replace("with_Ty = false", 'with_Ty = "no"'), "with_Ty is 'no', wanted true or false"),
+        (TINY.replace('"first-harmonic"', '"dipoles"'), "magnetics is 'dipoles', wanted one of exact, first-harmonic"),
         (TINY.replace("starts = 1", "starts = 0"), "starts is 0, wanted a whole number of at least 1"),
     ],
 )
