@@ -34,7 +34,7 @@ def decouple(
     mode_weight: float = 1.0,
     sensing: str = "all",
     weight: Weight | None = None,
-    degree: int = 44,
+    degree: int = 48,
 ) -> DecoupledPlant:
     r"""Decouple a plant into rigid-body axes and `n_flex` preserved flexible modes (eq. 6-8).
 
