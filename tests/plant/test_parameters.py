@@ -69,7 +69,7 @@ def test_the_mover_stays_over_the_coils():
         MMPAParameters(coils_short=12)
     with pytest.raises(DomainError, match=r"window_long reaches 0.25 m .* 0.31 m .* end at 0.3 m along their long"):
         MMPAParameters(window_long=(0.153, 0.25))
-    small = MMPAParameters(coils_short=14, travel=0.06)
+    small = MMPAParameters(coils_short=14, travel=0.06, window_short=(0.1, 0.2))
     with pytest.raises(DomainError, match="leaves the coils"):
         replace(small, travel=0.131, sensor_z_half_span=0.01, sensor_xy_half_span=0.01)
 
