@@ -58,8 +58,8 @@ WORK: dict[str, Callable[[Settings, Progress], Found]] = {
 
 def parts_of(settings: Settings) -> list[str]:
     """Names of the parts, the longest first, so that processes end at about the same time."""
-    return [*(f"polynomial-{n}" for n in sorted(settings.n_flexes, reverse=True)), "windows", "effects",
-            *(name for name in WORK if name not in ("windows", "effects"))]  # fmt: skip
+    longest = ["effects", "windows", *(f"polynomial-{n}" for n in sorted(settings.n_flexes, reverse=True))]
+    return longest + [name for name in WORK if name not in longest]
 
 
 def run(settings: Settings, out: Path, progress: Progress) -> None:

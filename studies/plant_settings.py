@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lpvhinf.checks import Array, finite_array, positive, whole_number
+from lpvhinf.checks import Array, finite_array, points_in_box, positive, whole_number
 from lpvhinf.errors import DomainError
 from lpvhinf.plant.mmpa import MMPA, MMPAParameters, benchmark
 from lpvhinf.plant.mmpa.magnetics.coil_wrench import KINDS
@@ -59,7 +59,7 @@ class Settings:
         _check_list("mode_weights", self.mode_weights)
         if np.any(finite_array("mode_weights", self.mode_weights, (None,)) <= 0.0):
             raise DomainError(f"mode_weights is {self.mode_weights}, wanted values above 0.")
-        finite_array("position", self.position, (2,))
+        points_in_box(finite_array("position", self.position, (2,)), MMPAParameters().box, name="position")
         finite_array("windows", self.windows, (None, 5))
         _check_list("windows", self.windows)
         for window in self.windows:
@@ -75,7 +75,9 @@ def windowed(window: Any) -> MMPAParameters:
     """The benchmark's parameters with other windows: inner and outer distance, short and long axis [m]; order."""
     short_inner, short_outer, long_inner, long_outer, order = (float(x) for x in window)
     return MMPAParameters(
-        window_short=(short_inner, short_outer), window_long=(long_inner, long_outer), window_order=order  # type: ignore[arg-type]
+        window_short=(short_inner, short_outer),
+        window_long=(long_inner, long_outer),
+        window_order=order,  # type: ignore[arg-type]
     )
 
 
