@@ -63,9 +63,7 @@ def test_the_mover_stays_over_the_coils():
     # 16 coils of 40 mm along the short axis, 5 of 120 mm along the long one: the coils end at 320 and 300 mm
     with pytest.raises(DomainError, match=r"gets 0.21 m from the middle .* leaves the coils, which end at 0.18 m"):
         MMPAParameters(coils_long=3)
-    with pytest.raises(
-        DomainError, match=r"window_short reaches 0.23 m .* 0.29 m .* end at 0.24 m along their short"
-    ):
+    with pytest.raises(DomainError, match=r"window_short reaches 0.23 m .* 0.29 m .* end at 0.24 m along their short"):
         MMPAParameters(coils_short=12)
     with pytest.raises(DomainError, match=r"window_long reaches 0.25 m .* 0.31 m .* end at 0.3 m along their long"):
         MMPAParameters(window_long=(0.153, 0.25))
