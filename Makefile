@@ -15,6 +15,7 @@ READY := $(VENV)/.installed
 # The tests run in this many processes; each keeps to one thread.
 JOBS ?= 2
 STUDY := results/output_observer
+PLANT := results/plant
 PIP_TOOLS := 7.6.2
 
 # Small matrices are slower with many threads, and sums in another order would change the last digits.
@@ -28,7 +29,9 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 help: ## this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-14s %s\n", $$1, $$2}'
 
-reproduce: $(READY) ## the paper's main study and its figures, in results/ (resumes if interrupted)
+reproduce: $(READY) ## the studies of the plant and of the paper, with their figures, in results/ (resumes if interrupted)
+	$(PY) -m studies run plant --preset paper --out $(PLANT)
+	$(PY) -m paper_figures --from $(PLANT) --out $(PLANT)/figures
 	$(PY) -m studies run output_observer --preset paper --out $(STUDY)
 	$(PY) -m paper_figures --from $(STUDY) --out $(STUDY)/figures
 

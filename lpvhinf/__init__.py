@@ -3,7 +3,7 @@
 Examples
 --------
 >>> import lpvhinf as lh
->>> plant = lh.mmpa.benchmark()
+>>> plant = lh.mmpa.benchmark(magnetics="first-harmonic")  # leave it out for the exact field of all magnets
 >>> lh.decouple(plant, n_flex=1).n_modes
 21
 """
@@ -31,10 +31,16 @@ from lpvhinf.hinfstruct import FixedOrder as FixedOrder
 from lpvhinf.hinfstruct import HinfstructResult as HinfstructResult
 from lpvhinf.hinfstruct import StaticGain as StaticGain
 from lpvhinf.hinfstruct import hinf_norm as hinf_norm
+from lpvhinf.plant import Actuator as Actuator
 from lpvhinf.plant import MechanicalModel as MechanicalModel
 from lpvhinf.plant import ModalModel as ModalModel
+from lpvhinf.plant import ModeData as ModeData
+from lpvhinf.plant import Plausibility as Plausibility
+from lpvhinf.plant import RigidBody as RigidBody
+from lpvhinf.plant import Sensor as Sensor
 from lpvhinf.plant import mmpa as mmpa
 from lpvhinf.plant import modal_form as modal_form
+from lpvhinf.plant import own_plant as own_plant
 from lpvhinf.progress import Progress as Progress
 from lpvhinf.statespace import GeneralizedPlant as GeneralizedPlant
 from lpvhinf.statespace import LPVGeneralizedPlant as LPVGeneralizedPlant

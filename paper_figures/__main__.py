@@ -6,23 +6,65 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
-from lpvhinf.errors import LpvHinfError
-from paper_figures import damping_trade, six_block
+from lpvhinf.errors import DomainError, LpvHinfError, StorageError
+from lpvhinf.storage import read_json
+from paper_figures import (
+    damping_trade,
+    plant_coil_currents,
+    plant_frf,
+    plant_modal_gains,
+    plant_mode_shapes,
+    plant_top_view,
+    six_block,
+)
 
-FIGURES = {six_block.NAME: six_block, damping_trade.NAME: damping_trade}
+# The figures of each study; a results folder says in settings.json which study it comes from.
+FIGURES: dict[str, dict[str, Any]] = {
+    "output_observer": {module.NAME: module for module in (six_block, damping_trade)},
+    "plant": {
+        module.NAME: module
+        for module in (plant_top_view, plant_mode_shapes, plant_modal_gains, plant_coil_currents, plant_frf)
+    },
+}
+
+
+def figures_of(results: Path) -> dict[str, Any]:
+    """The figures of the study that a results folder comes from.
+
+    Raises
+    ------
+    StorageError
+        If the folder does not say, or the study has no figures.
+    """
+    settings = read_json(results / "settings.json")
+    study = settings.get("study") if isinstance(settings, dict) else None
+    if study not in FIGURES:
+        raise StorageError(
+            f"{results / 'settings.json'} names the study {study!r}, wanted one of {', '.join(FIGURES)}. "
+            "Run the study again."
+        )
+    return FIGURES[study]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Draw one figure or all; the exit status is 1 after an error of ours."""
+    """Draw one figure or all of a study; the exit status is 1 after an error of ours."""
+    names = sorted(name for figures in FIGURES.values() for name in figures)
     parser = argparse.ArgumentParser(prog="python -m paper_figures", description="Draw figures from a results folder.")
-    parser.add_argument("name", nargs="?", choices=sorted(FIGURES), help="all if left out")
+    parser.add_argument("name", nargs="?", choices=names, help="all of the folder's study if left out")
     parser.add_argument("--from", dest="source", type=Path, required=True, help="results folder of a study")
     parser.add_argument("--out", type=Path, required=True, help="folder for the figures")
     arguments = parser.parse_args(argv)
     try:
-        for name in [arguments.name] if arguments.name else sorted(FIGURES):
-            for path in FIGURES[name].make(arguments.source, arguments.out):
+        figures = figures_of(arguments.source)
+        if arguments.name is not None and arguments.name not in figures:
+            raise DomainError(
+                f"{arguments.source} has no data for the figure {arguments.name!r}, only for "
+                f"{', '.join(sorted(figures))}. Name the folder of the study that it belongs to."
+            )
+        for name in [arguments.name] if arguments.name else sorted(figures):
+            for path in figures[name].make(arguments.source, arguments.out):
                 print(path)
     except LpvHinfError as error:
         print(f"error: {error}", file=sys.stderr)

@@ -6,15 +6,15 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from lpvhinf.cli.terminal import TerminalProgress
-from lpvhinf.errors import LpvHinfError
+from lpvhinf.errors import LpvHinfError, StorageError
 from lpvhinf.storage import read_json
-from studies import output_observer
-from studies.output_observer_report import write_report
+from studies import output_observer, plant
 from studies.settings import load_settings
 
-STUDIES = {output_observer.NAME: output_observer}
+STUDIES: dict[str, Any] = {output_observer.NAME: output_observer, plant.NAME: plant}
 
 
 def parser() -> argparse.ArgumentParser:
@@ -22,7 +22,7 @@ def parser() -> argparse.ArgumentParser:
     top = argparse.ArgumentParser(prog="python -m studies", description="Reproduce the studies of the project.")
     commands = top.add_subparsers(dest="command", required=True)
     commands.add_parser("list", help="name the studies and their presets")
-    run = commands.add_parser("run", help="run a study; finished designs in the folder are kept")
+    run = commands.add_parser("run", help="run a study; what is finished in the folder is kept")
     run.add_argument("name", choices=sorted(STUDIES))
     run.add_argument("--preset", default="paper", help="tiny, paper, or the path of a .toml file")
     run.add_argument("--out", type=Path, help="results folder, default results/NAME")
@@ -30,6 +30,18 @@ def parser() -> argparse.ArgumentParser:
     report = commands.add_parser("report", help="write the report of a results folder anew")
     report.add_argument("folder", type=Path)
     return top
+
+
+def study_of(folder: Path) -> Any:
+    """The study that a results folder comes from; a `StorageError` if it does not say so."""
+    settings = read_json(folder / "settings.json")
+    name = settings.get("study") if isinstance(settings, dict) else None
+    if name not in STUDIES:
+        raise StorageError(
+            f"{folder / 'settings.json'} names the study {name!r}, wanted one of {', '.join(STUDIES)}. "
+            "Run the study again."
+        )
+    return STUDIES[name]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -45,8 +57,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             with TerminalProgress() as progress:
                 study.run(settings, arguments.out or Path("results") / arguments.name, progress)
         else:
-            read_json(arguments.folder / "settings.json")
-            write_report(arguments.folder)
+            study_of(arguments.folder).write_report(arguments.folder)
     except LpvHinfError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1

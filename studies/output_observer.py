@@ -27,12 +27,12 @@ from lpvhinf.codesign.measures import block_responses, bounds
 from lpvhinf.codesign.report import figures
 from lpvhinf.decoupling import DecoupledPlant, decouple
 from lpvhinf.errors import DomainError, StorageError
+from lpvhinf.jobs import run_jobs
 from lpvhinf.plant.mmpa import benchmark
-from lpvhinf.plant.mmpa.magnetics import KINDS
+from lpvhinf.plant.mmpa.magnetics.coil_wrench import KINDS
 from lpvhinf.progress import SILENT, Progress
 from lpvhinf.statespace import LPVStateSpace
 from lpvhinf.storage import make_folder, read_arrays, read_json, write_arrays, write_json
-from lpvhinf.jobs import run_jobs
 from studies.output_observer_report import write_report
 from studies.record import run_record
 from studies.settings import fingerprint

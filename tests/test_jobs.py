@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from lpvhinf.errors import SynthesisError
-from lpvhinf.progress import Progress
 from lpvhinf.jobs import run_jobs
+from lpvhinf.progress import Progress
 
 
 class Recorder(Progress):

@@ -24,6 +24,9 @@ def parser() -> argparse.ArgumentParser:
     design.add_argument("--architecture", default="output-observer", choices=["rigid-body", "output-observer"])
     design.add_argument("--n-flex", type=int, default=1, help="controlled flexible modes")
     design.add_argument("--plant-modes", type=int, default=15, help="flexible modes of the plant model")
+    design.add_argument(
+        "--magnetics", default="exact", choices=["exact", "first-harmonic"], help="field of the magnets"
+    )
     design.add_argument("--out", type=Path, required=True, help="folder for the design's arrays")
     return top
 
@@ -34,8 +37,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         specification = read_specification(arguments.settings)
         make_folder(arguments.out)  # before the work, which would else be lost
-        plant = lpvhinf.decouple(lpvhinf.mmpa.benchmark(n_flex=arguments.plant_modes), n_flex=arguments.n_flex)
         with TerminalProgress() as progress:
+            actuator = lpvhinf.mmpa.benchmark(
+                n_flex=arguments.plant_modes, magnetics=arguments.magnetics, progress=progress
+            )
+            plant = lpvhinf.decouple(actuator, n_flex=arguments.n_flex)
             design = lpvhinf.codesign(plant, arguments.architecture, specification, progress=progress)
         design.save(arguments.out)
         print(design.report())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -27,8 +28,8 @@ ARCHITECTURES = ("rigid-body", "output-observer")
 class Assembly:
     """Everything of a co-design that does not depend on the tuned parameters.
 
-    The observer's C_o(p) and D_o(p) are what a controller would implement: polynomials. The plant beside
-    it is the polynomial one in `loop`, and the plant model itself in `frozen_loops`.
+    The observer's matrices are what a controller would implement: polynomials, from the known model of the
+    plant. The plant beside it is the polynomial one in `loop`, and the plant model itself in `frozen_loops`.
     """
 
     plant: DecoupledPlant
@@ -37,15 +38,25 @@ class Assembly:
 
     @cached_property
     def scaling(self) -> Scaling:
-        """Scalings of the plant's channels and states."""
-        n_rb = self.plant.n_rb
-        return scaling(self.plant, self.specification.bandwidths(n_rb), self.specification.errors(n_rb))
+        """Scalings of the channels and of the observer's states, from what is known of the plant."""
+        return self._scaling_of(self.plant.known)
+
+    @cached_property
+    def plant_scaling(self) -> Scaling:
+        """The same scalings of the channels, with those of the true plant's own states."""
+        if self.plant.known is self.plant:
+            return self.scaling
+        return dataclasses.replace(self.scaling, state=self._scaling_of(self.plant).state)
+
+    def _scaling_of(self, plant: DecoupledPlant) -> Scaling:
+        n_rb = plant.n_rb
+        return scaling(plant, self.specification.bandwidths(n_rb), self.specification.errors(n_rb))
 
     @cached_property
     def omega_flex(self) -> Array:
-        """Frequencies of the controlled modes (n_flex,) [rad/s]."""
+        """Frequencies of the controlled modes (n_flex,) [rad/s], as they are known."""
         n_rb = self.plant.n_rb
-        return np.asarray(self.plant.omega[n_rb : n_rb + self.plant.n_flex])
+        return np.asarray(self.plant.known.omega[n_rb : n_rb + self.plant.n_flex])
 
     @cached_property
     def filters(self) -> ShapingFilters:
@@ -57,10 +68,11 @@ class Assembly:
         """The observer's scheduled model, or None for the conventional design."""
         if self.architecture == "rigid-body":
             return None
-        n_kept = self.plant.n_rb + self.plant.n_flex
-        correction = interpolate(self.plant.static_correction, box=self.plant.box, degree=self.plant.degree).matrix
+        known = self.plant.known
+        n_kept = known.n_rb + known.n_flex
+        correction = interpolate(known.static_correction, box=known.box, degree=known.degree).matrix
         size = float(np.max(np.abs(correction.coefficients)))
-        scaled = self.scaling.apply(self.plant.system)
+        scaled = self.scaling.apply(known.system)
         model = observer_model(scaled, n_kept, self.scaling.correction(correction.trimmed(1e-13 * size)))
         rigid = np.repeat(2 * np.pi * self.scaling.f_bw, 2)
         return ObserverBranch(
@@ -68,7 +80,7 @@ class Assembly:
             omega=self.omega_flex,
             Q=self.specification.Q,
             # a mode's correction is scaled by the bandwidth too: its Riccati gain is far below omega_i
-            injection=np.concatenate([rigid, np.full(2 * self.plant.n_flex, float(np.max(rigid)))]),
+            injection=np.concatenate([rigid, np.full(2 * known.n_flex, float(np.max(rigid)))]),
         )
 
     @cached_property
@@ -81,11 +93,11 @@ class Assembly:
         systems = self.plant.frozen(points)
         if self.observer is None:
             return [self._loop(system, None) for system in systems]
-        C, D = self.observer.model.C.sample(points), self.observer.model.D.sample(points)
         box, model = self.plant.box, self.observer.model
+        B, C, D = model.B.sample(points), model.C.sample(points), model.D.sample(points)
         loops = []
-        for system, c, d in zip(systems, C, D, strict=True):
-            frozen = LPVStateSpace(model.A, model.B, ChebyshevMatrix(c, box), ChebyshevMatrix(d, box))
+        for system, b, c, d in zip(systems, B, C, D, strict=True):
+            frozen = LPVStateSpace(model.A, *(ChebyshevMatrix(m, box) for m in (b, c, d)))
             branch = ObserverBranch(
                 model=frozen, omega=self.observer.omega, Q=self.observer.Q, injection=self.observer.injection
             )
@@ -93,7 +105,7 @@ class Assembly:
         return loops
 
     def _loop(self, system: LPVStateSpace, observer: ObserverBranch | None) -> Loop:
-        plant = self.scaling.apply(system)
+        plant = self.plant_scaling.apply(system)
         if self.specification.delay > 0.0:
             delay = pade_delay(self.specification.delay, self.specification.delay_order, self.plant.n_out)
             plant = plant.series(LPVStateSpace.from_system(delay, plant.box))

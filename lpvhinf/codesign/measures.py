@@ -48,7 +48,9 @@ class Measures:
 
 def measure(design: Design, points: Array, *, progress: Progress = SILENT) -> Measures:
     """Measure a design at positions (N, n_p)."""
-    n_rb, n_flex = design.assembly.plant.n_rb, design.assembly.plant.n_flex
+    plant = design.assembly.plant
+    n_rb, n_flex = plant.n_rb, plant.n_flex
+    omega_flex = plant.omega[n_rb : n_rb + n_flex]
     rows = []
     for start in range(0, len(points), BATCH):
         for A, B, C, D in design.frozen(points[start : start + BATCH]):
@@ -56,7 +58,7 @@ def measure(design: Design, points: Array, *, progress: Progress = SILENT) -> Me
             w3 = range(2 * n_rb, 2 * n_rb + n_flex)
             peaks = [hinf_norm(A, B[:, [k]], C[e], D[e][:, [k]]).norm for k in w3]
             response = Response(A, B[:, 2 * n_rb :], C[e], D[e, 2 * n_rb :])
-            own = [peak_near(response, k, w) for k, w in enumerate(design.assembly.omega_flex)]
+            own = [peak_near(response, k, w) for k, w in enumerate(omega_flex)]
             controlled, rest = mode_damping(design, A)
             rows.append(
                 (

@@ -33,7 +33,8 @@ def observer_model(plant: LPVStateSpace, n_preserved: int, correction: Chebyshev
     kept = slice(0, 2 * n_preserved)
     every = slice(None)
     parts = (plant.A[kept, kept], plant.B[kept, every], plant.C[every, kept], correction)
-    return LPVStateSpace(*(part.trimmed() for part in parts))  # the kept rows of B(p) are constant
+    # with exact decoupling the kept rows of B(p) are constant
+    return LPVStateSpace(*(part.trimmed() for part in parts))
 
 
 def riccati_gain(model: LPVStateSpace, p: ArrayLike, process_noise: Array, measurement_noise: Array) -> Array:

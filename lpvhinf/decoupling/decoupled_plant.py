@@ -1,64 +1,30 @@
-"""The decoupled plant: rigid axes that are 1/s^2 for every p, preserved and discarded flexible modes."""
+"""The decoupled plant: rigid axes that are 1/s^2, preserved and discarded flexible modes, at every p."""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike
 
-from lpvhinf.checks import Array, finite_array, points_in_box, read_only
-from lpvhinf.decoupling.partition import compliance_correction, mode_dynamics
+from lpvhinf.checks import Array, finite_array, points_in_box
+from lpvhinf.decoupling.coupling import ChannelCoupling, channel_coupling
+from lpvhinf.decoupling.fully_actuated import shared_inputs
+from lpvhinf.decoupling.gains import DecoupledGains, fit_gains
+from lpvhinf.decoupling.partition import compliance_correction
+from lpvhinf.decoupling.state_space import modal_state_space, unit_inputs, unit_outputs
+from lpvhinf.decoupling.structure import StructureReport, structure_report
 from lpvhinf.decoupling.transformations import input_decoupling, output_decoupling
-from lpvhinf.errors import AssumptionError, DomainError
-from lpvhinf.fitting import MatrixFit, interpolate, spread_points
-from lpvhinf.plant.modal import ModalModel
-from lpvhinf.polynomial import ChebyshevMatrix, block
+from lpvhinf.fitting import MatrixFit
+from lpvhinf.plant.modal import ModalGains, ModalModel
+from lpvhinf.polynomial import ChebyshevMatrix
 from lpvhinf.statespace.lpv import LPVStateSpace
 
 Weight = Callable[[Array], Array]
-STRUCTURE_TOLERANCE = 1e-10
-
-
-@dataclass(frozen=True, eq=False)
-class StructureReport:
-    """How exactly the decoupling holds, over `n_points` positions.
-
-    Attributes
-    ----------
-    rigid_body : float
-        Largest deviation of the rigid-body input and output matrices from the identity.
-    preserved_excitation : float
-        Largest force of a rigid-body input on a preserved flexible mode, relative to the largest
-        force of the same input on any mode, mass-normalised.
-    """
-
-    rigid_body: float
-    preserved_excitation: float
-    n_points: int
-
-
-@dataclass(frozen=True, eq=False)
-class DecoupledGains:
-    """Input, output and feed-through gains of all modes at N positions, from the plant model itself.
-
-    Attributes
-    ----------
-    B : (N, n_modes, n_rb + n_flex)
-        Modal accelerations per unit input.
-    C : (N, n_out, n_modes)
-        Outputs per unit of every mode.
-    D : (N, n_out, n_rb + n_flex)
-        Static compliance of the truncated modes.
-    """
-
-    B: Array
-    C: Array
-    D: Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,12 +38,20 @@ class DecoupledPlant:
     with :math:`q = S \eta_{RB}` the rescaling to these units leaves every rigid axis exactly :math:`1/s^2`
     for every p.
 
+    T_y and T_u come from `known_modal`, what the machine believes of itself, and act on the plant `modal`.
+    Where the two differ, or the plant is fully actuated, the rigid axes and preserved modes are coupled and
+    their gains depend on p: the plant then carries the gains of all modes as they are. `known` is what a
+    controller may build on.
+
     Make one with `decouple`.
     """
 
     modal: ModalModel
+    known_modal: ModalModel
     n_flex: int
+    actuation: str
     input_decoupling: str
+    mode_weight: float
     sensing: str
     weight: Weight | None
     degree: int
@@ -106,7 +80,7 @@ class DecoupledPlant:
     def redundancy(self) -> Array:
         """Orthonormal rows (n_red, n_y) with no rigid-body content at the centre of P; none for "rigid-body"."""
         centre = np.mean(self.box, axis=1)[None]
-        rigid = self.modal.output_gains(centre)[0][:, : self.n_rb]
+        rigid = self.known_modal.output_gains(centre)[0][:, : self.n_rb]
         if self.sensing == "rigid-body":
             return np.zeros((0, len(rigid)))
         return np.asarray(scipy.linalg.null_space(rigid.T).T)
@@ -126,201 +100,131 @@ class DecoupledPlant:
         """Indices of the discarded modes."""
         return slice(self.n_rb + self.n_flex, None)
 
+    @property
+    def exact_outputs(self) -> bool:
+        """Whether every rigid-body mode is one output and no other: the sensors are what T_y believes."""
+        return self.known_modal is self.modal
+
+    @property
+    def exact_inputs(self) -> bool:
+        """Whether the decoupled modes have unit gains: the actuators are what T_u believes, and are enough."""
+        return self.known_modal is self.modal and (self.actuation == "over" or self.n_flex == 0)
+
+    @cached_property
+    def known(self) -> DecoupledPlant:
+        """The decoupled plant as it is believed to be, which observers are built from; itself if that is true."""
+        return self if self.known_modal is self.modal else dataclasses.replace(self, modal=self.known_modal)
+
     def matrices(self, points: ArrayLike) -> tuple[Array, Array]:
         """T_y (N, n_out, n_y) and T_u (N, n_u, n_rb + n_flex) at N positions, in the physical units."""
-        T_y, T_u, _ = self._transform(points_in_box(points, self.box))
-        return T_y, T_u
+        where = points_in_box(points, self.box)
+        return self._matrices(where, self.known_modal.gains(where))
 
     def sample(self, points: ArrayLike) -> DecoupledGains:
         """The gains at positions (N, n_p), computed from the plant model, not from a polynomial fit."""
-        return self._transform(points_in_box(points, self.box))[2]
+        where = points_in_box(points, self.box)
+        return self._gains(where, *self._models(where))
 
-    def _transform(self, points: Array) -> tuple[Array, Array, DecoupledGains]:
-        gains = self.modal.gains(points)
-        inputs, outputs, compliance = gains.input_gains, gains.output_gains, gains.compliance
-        weights = (
-            None if self.weight is None else finite_array("weight(points)", self.weight(points), inputs.shape[::2])
-        )
-        n_rb, n_ctrl = self.n_rb, self.n_rb + self.n_flex
-        S = self.modal.rigid_body_scaling
-        rigid = outputs[:, :, :n_rb]
+    def _models(self, points: Array) -> tuple[ModalGains, ModalGains]:
+        """Gains of the known and of the true model."""
+        known = self.known_modal.gains(points)
+        return known, known if self.known_modal is self.modal else self.modal.gains(points)
+
+    def _gains(self, points: Array, known: ModalGains, true: ModalGains) -> DecoupledGains:
+        """The true gains behind the transformations that come from the known ones."""
+        T_y, T_u = self._matrices(points, known)
+        n_rb, S = self.n_rb, self.modal.rigid_body_scaling
+        B, C = true.input_gains @ T_u, T_y @ true.output_gains
+        B[:, :n_rb] = S @ B[:, :n_rb]
+        C[:, :, :n_rb] = C[:, :, :n_rb] @ np.linalg.inv(S)
+        return DecoupledGains(B, C, T_y @ true.compliance @ T_u)
+
+    def _matrices(self, points: Array, known: ModalGains) -> tuple[Array, Array]:
+        """T_y and T_u from the gains that are believed."""
+        inputs, n_rb, n_ctrl = known.input_gains, self.n_rb, self.n_rb + self.n_flex
+        weights = self._weights(points, inputs.shape[2])
+        S = self.known_modal.rigid_body_scaling
+        rigid = known.output_gains[:, :, :n_rb]
         T_rb = output_decoupling(rigid)
         # with frame-fixed sensors the readings of rigid-body motion span the same space at every p; the
         # projection keeps the redundant rows free of it where they do not
         redundant = self.redundancy - (self.redundancy @ rigid) @ T_rb
         T_y = np.concatenate([S @ T_rb, redundant], axis=1)
-        T_u = input_decoupling(inputs[:, :n_ctrl], weights)
+        if self.actuation == "full":
+            forces = input_decoupling(inputs[:, :n_rb], weights)
+            T_u = forces @ shared_inputs(inputs[:, n_rb:n_ctrl] @ forces, self.mode_weight)
+        else:
+            T_u = input_decoupling(inputs[:, :n_ctrl], weights)
         if self.input_decoupling == "rigid-body":
             # the conventional rigid inputs know nothing of flexible modes; the modal inputs stay the extended ones
             T_u = np.concatenate([input_decoupling(inputs[:, :n_rb], weights), T_u[:, :, n_rb:]], axis=2)
-        T_u = np.concatenate([T_u[:, :, :n_rb] @ np.linalg.inv(S), T_u[:, :, n_rb:]], axis=2)
-        B, C = inputs @ T_u, T_y @ outputs
-        B[:, :n_rb] = S @ B[:, :n_rb]
-        C[:, :, :n_rb] = C[:, :, :n_rb] @ np.linalg.inv(S)
-        return T_y, T_u, DecoupledGains(B, C, T_y @ compliance @ T_u)
+        return T_y, np.concatenate([T_u[:, :, :n_rb] @ np.linalg.inv(S), T_u[:, :, n_rb:]], axis=2)
+
+    def _weights(self, points: Array, n_u: int) -> Array | None:
+        """Weights of the actuators (N, n_u), or None for ones."""
+        return None if self.weight is None else finite_array("weight(points)", self.weight(points), (len(points), n_u))
 
     def verify(self, points: ArrayLike) -> StructureReport:
-        """How exactly the structure that the design relies on holds at positions (N, n_p)."""
-        gains, n_rb, n_ctrl = self.sample(points), self.n_rb, self.n_rb + self.n_flex
-        identity = np.eye(n_rb)
-        from_modal_inputs = np.max(np.abs(gains.B[:, :n_rb, n_rb:]), initial=0.0)
-        rigid = max(
-            float(np.max(np.abs(gains.B[:, :n_rb, :n_rb] - identity))),
-            float(np.max(np.abs(gains.C[:, :, :n_rb] - np.eye(self.n_out, n_rb)))),
-            float(from_modal_inputs / max(1.0, np.max(np.abs(gains.B[:, :, n_rb:]), initial=0.0))),
-        )
-        flexible = np.abs(gains.B[:, n_rb:, :n_rb])
-        on_rigid = np.max(np.abs(np.linalg.inv(self.modal.rigid_body_scaling)), axis=0)
-        largest = np.maximum(np.max(flexible, axis=(0, 1), initial=0.0), on_rigid)
-        excited = float(np.max(flexible[:, : n_ctrl - n_rb] / largest, initial=0.0))
-        return StructureReport(rigid, excited, len(gains.B))
+        """How exactly the structure that a design relies on holds at positions (N, n_p)."""
+        where = points_in_box(points, self.box)
+        S = self.known_modal.rigid_body_scaling
+        return structure_report(where, self.sample(where), n_flex=self.n_flex, rigid_body_scaling=S)
+
+    def coupling(self, points: ArrayLike) -> ChannelCoupling:
+        """How much rigid-body and modal channels drive each other at positions (N, n_p)."""
+        where = points_in_box(points, self.box)
+        known, true = self._models(where)
+        n_rb, n_ctrl, S = self.n_rb, self.n_rb + self.n_flex, self.known_modal.rigid_body_scaling
+        gains = self._gains(where, known, true)
+        B = gains.B[:, :n_ctrl].copy()
+        B[:, :n_rb] = np.linalg.inv(S) @ B[:, :n_rb]
+        B[:, :, :n_rb] = B[:, :, :n_rb] @ S
+        if self.known is not self:
+            # the sign of a mode shape is free: take that of the known one, as the sensors see both
+            believed = self.known._gains(where, known, known)
+            seen = np.sum(gains.C[:, :, n_rb:n_ctrl] * believed.C[:, :, n_rb:n_ctrl], axis=(0, 1))
+            B[:, n_rb:] *= np.where(seen < 0.0, -1.0, 1.0)[:, None]
+        forces = input_decoupling(known.input_gains[:, :n_rb], self._weights(where, known.input_gains.shape[2]))
+        return channel_coupling(where, B, true.input_gains[:, n_rb:n_ctrl] @ forces)
 
     @cached_property
     def fit(self) -> dict[str, MatrixFit]:
-        """Chebyshev fits of the gains of all flexible modes: "B", "C" and "D", with measured errors."""
-        shapes: list[tuple[int, ...]] = []
+        """Chebyshev fits of the gains, "B", "C" and "D", with measured errors.
 
-        def flat(points: Array) -> Array:
-            gains = self.sample(points)
-            parts = [gains.B[:, self.n_rb :], gains.C[:, :, self.n_rb :], gains.D]
-            shapes[:] = [part.shape[1:] for part in parts]
-            return np.concatenate([part.reshape(len(points), 1, -1) for part in parts], axis=2)
+        "B" has the rows, "C" the columns of the flexible modes only where those of the rigid-body modes are exact
+        (`exact_inputs`, `exact_outputs`), else of all modes.
+        """
+        return fit_gains(lambda points: self._without_exact(self.sample(points)), box=self.box, degree=self.degree)
 
-        joined = interpolate(flat, box=self.box, degree=self.degree)
-        fits, start = {}, 0
-        for name, (rows, cols) in zip("BCD", shapes, strict=True):
-            cut = slice(start, start + rows * cols)
-            c = joined.matrix.coefficients[..., 0, cut].reshape(*joined.matrix.coefficients.shape[:-2], rows, cols)
-            matrix = ChebyshevMatrix(c, self.box).trimmed(1e-13 * float(np.max(np.abs(c), initial=0.0)))
-            scale = float(np.max(np.abs(matrix.sample(spread_points(self.box, joined.n_test))), initial=0.0))
-            fits[name] = MatrixFit(matrix, joined.error[0, cut].reshape(rows, cols), scale, joined.n_test)
-            start += rows * cols
-        return fits
+    def _without_exact(self, gains: DecoupledGains) -> DecoupledGains:
+        """The gains without those of rigid-body modes that are known exactly."""
+        first_row = self.n_rb if self.exact_inputs else 0
+        first_column = self.n_rb if self.exact_outputs else 0
+        return DecoupledGains(gains.B[:, first_row:], gains.C[:, :, first_column:], gains.D)
 
     @cached_property
     def system(self) -> LPVStateSpace:
-        """The decoupled plant as a polynomial LPV state space; its structural zeros and ones are exact."""
+        """The decoupled plant as a polynomial LPV state space; structural zeros and ones are exact where they hold."""
         fits = self.fit
         return self._assemble(fits["B"].matrix, fits["C"].matrix, fits["D"].matrix)
 
     def frozen(self, points: ArrayLike) -> list[LPVStateSpace]:
         """The plant model itself at positions (N, n_p), each as a constant system over the box."""
-        gains = self.sample(points)
-        box, n_rb = self.box, self.n_rb
+        gains, box = self._without_exact(self.sample(points)), self.box
         return [
-            self._assemble(ChebyshevMatrix(B[n_rb:], box), ChebyshevMatrix(C[:, n_rb:], box), ChebyshevMatrix(D, box))
+            self._assemble(ChebyshevMatrix(B, box), ChebyshevMatrix(C, box), ChebyshevMatrix(D, box))
             for B, C, D in zip(gains.B, gains.C, gains.D, strict=True)
         ]
 
     def _assemble(self, B: ChebyshevMatrix, C: ChebyshevMatrix, D: ChebyshevMatrix) -> LPVStateSpace:
-        """The state space from the gains of the flexible modes."""
-        n_rb, n_modes, n_in, box = self.n_rb, self.n_modes, self.n_rb + self.n_flex, self.box
-        # rows of B: the decoupled modes have exact unit gains, each from its own input
-        keep = self.n_flex if self.input_decoupling == "extended" else 0
-        top = np.eye(n_rb + keep, n_in)
-        B_modes = block([[top], [B[keep:, :]]], box)
-        if self.input_decoupling == "rigid-body" and self.n_flex:
-            exact = B_modes.coefficients.copy()
-            own = slice(n_rb, n_in)
-            exact[..., own, own] = 0.0
-            exact[(0,) * len(box)][own, own] = np.eye(self.n_flex)
-            B_modes = ChebyshevMatrix(exact, box)
-        C_modes = block([[np.eye(self.n_out, n_rb), C]], box)
-        velocities, positions = np.zeros((2 * n_modes, n_modes)), np.zeros((n_modes, 2 * n_modes))
-        velocities[np.arange(1, 2 * n_modes, 2), np.arange(n_modes)] = 1.0
-        positions[np.arange(n_modes), np.arange(0, 2 * n_modes, 2)] = 1.0
-        return LPVStateSpace(
-            ChebyshevMatrix(mode_dynamics(self.omega, self.zeta), box), velocities @ B_modes, C_modes @ positions, D
-        )
+        """The state space from gains as `_without_exact` leaves them."""
+        if self.exact_inputs:
+            B = unit_inputs(B, n_rb=self.n_rb, n_flex=self.n_flex, input_decoupling=self.input_decoupling)
+        if self.exact_outputs:
+            C = unit_outputs(C, n_rb=self.n_rb)
+        return modal_state_space(self.omega, self.zeta, B, C, D)
 
     def static_correction(self, points: ArrayLike) -> Array:
         """Compliance of everything that the observer leaves out, (N, n_out, n_rb + n_flex): D_o of eq. 9."""
         gains, d = self.sample(points), self.discarded
         return compliance_correction(gains.C[:, :, d], gains.B[:, d], self.omega[d]) + gains.D
-
-
-def decouple(
-    plant: Any,
-    *,
-    n_flex: int = 1,
-    actuation: str = "over",
-    input_decoupling: str = "extended",
-    sensing: str = "all",
-    weight: Weight | None = None,
-    degree: int = 40,
-) -> DecoupledPlant:
-    r"""Decouple a plant into rigid-body axes and `n_flex` preserved flexible modes (eq. 6-8).
-
-    Parameters
-    ----------
-    plant : ModalModel, or an object with `.modal` and `.coil_weights` such as the planar actuator
-    n_flex : int
-        Number of flexible modes that the actuators drive one by one and the observer preserves.
-    actuation : "over"
-        More actuators than decoupled modes, so that the decoupling is exact.
-    input_decoupling : "extended" or "rigid-body"
-        Whether the rigid-body inputs also avoid the preserved flexible modes (eq. 7), or are those of the
-        conventional decoupling (eq. 6), which excites them.
-    sensing : "all" or "rigid-body"
-        Whether redundant sensors stay available to an observer. T_y of eq. 6 alone ("rigid-body") throws away
-        what they read beyond rigid-body motion, which may be the only output that sees a flexible mode with
-        the same sign at every position.
-    weight : callable (N, n_p) -> (N, n_u), optional
-        Weights of the actuators in the pseudo-inverse; default those of the plant, else ones.
-    degree : int
-        Chebyshev degree of the polynomial model along every axis of p.
-
-    Raises
-    ------
-    DomainError
-        If an option or `n_flex` is unknown.
-    AssumptionError
-        If there are too few actuators or sensors, a preserved mode is not observable at any position, or
-        the decoupling does not hold to 1e-10.
-    """
-    modal = plant if isinstance(plant, ModalModel) else getattr(plant, "modal", None)
-    if not isinstance(modal, ModalModel):
-        raise DomainError(
-            f"plant is a {type(plant).__name__}, wanted a ModalModel or an object with one as `.modal`. "
-            "Use modal_form on a MechanicalModel first."
-        )
-    if weight is None:
-        weight = getattr(plant, "coil_weights", None)
-    if actuation != "over":
-        raise DomainError(f"actuation is {actuation!r}, wanted 'over': more actuators than decoupled modes.")
-    if input_decoupling not in ("extended", "rigid-body"):
-        raise DomainError(f"input_decoupling is {input_decoupling!r}, wanted 'extended' or 'rigid-body'.")
-    if sensing not in ("all", "rigid-body"):
-        raise DomainError(f"sensing is {sensing!r}, wanted 'all' or 'rigid-body'.")
-    if n_flex not in range(modal.n_modes - modal.n_rb + 1):
-        raise DomainError(f"n_flex is {n_flex}, wanted 0 to {modal.n_modes - modal.n_rb} flexible modes.")
-    decoupled = DecoupledPlant(
-        modal=modal,
-        n_flex=n_flex,
-        input_decoupling=input_decoupling,
-        sensing=sensing,
-        weight=weight,
-        degree=degree,
-    )
-    points = read_only(np.vstack([np.mean(modal.box, axis=1)[None], spread_points(modal.box, 32)]))
-    _check_observable(decoupled.sample(points), decoupled)
-    report = decoupled.verify(points)
-    wrong = max(report.rigid_body, report.preserved_excitation if input_decoupling == "extended" else 0.0)
-    if wrong > STRUCTURE_TOLERANCE:
-        raise AssumptionError(
-            f"the decoupling holds to {wrong:.2g} only, wanted {STRUCTURE_TOLERANCE:.0g}: the actuators or sensors "
-            "are nearly dependent. Change their places or the weights."
-        )
-    return decoupled
-
-
-def _check_observable(gains: DecoupledGains, plant: DecoupledPlant) -> None:
-    sizes = np.max(np.linalg.norm(gains.C, axis=1), axis=0)
-    flexible = sizes[plant.n_rb :]
-    for k in range(plant.n_flex):
-        if flexible[k] <= 1e-9 * np.max(flexible):
-            hertz = plant.omega[plant.n_rb + k] / (2 * np.pi)
-            raise AssumptionError(
-                f"preserved mode {k + 1} ({hertz:.1f} Hz) is not observable at any position: its largest output gain "
-                f"is {flexible[k]:.2g}. Add or move a sensor, or lower n_flex."
-            )

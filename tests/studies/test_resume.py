@@ -35,6 +35,7 @@ SMALLEST = Settings(
     measure_grid=2,
     response_grid=1,
     with_Ty=False,
+    magnetics="first-harmonic",
 )
 CONVENTIONAL: Job = jobs_of(SMALLEST)[0][0]
 OBSERVER: Job = jobs_of(SMALLEST)[1][0]

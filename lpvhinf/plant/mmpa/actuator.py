@@ -34,7 +34,8 @@ class MMPA:
         The truth: q = (x, y, rz in-plane at the place of the centre of gravity, 225 Ritz coefficients of w); u 160
         coil currents [A]; y nine interferometers [m].
     modal : ModalModel
-        The truth: rigid-body modes x, y, z, rx, ry, rz about the centre of gravity, then the flexible modes.
+        The truth: rigid-body modes x, y, z, rx, ry, rz about the centre of gravity, then the flexible modes in order
+        of frequency, with the signs of the known ones.
     known : ModalModel
         What commutation and sensor transformation believe: nominal mover, coils, magnets and beams, the field that
         the commutation knows, evaluated where it believes the mover. It is `modal` itself if nothing deviates.

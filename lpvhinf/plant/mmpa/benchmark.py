@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,11 +15,12 @@ from lpvhinf.plant.mmpa.coils import CoilLayer, CoilWrench, coil_layers
 from lpvhinf.plant.mmpa.effects import Effects
 from lpvhinf.plant.mmpa.imperfections import deviating_magnets, misplaced_layers
 from lpvhinf.plant.mmpa.input_map import CoilInputMap
-from lpvhinf.plant.mmpa.magnetics import coil_wrench
+from lpvhinf.plant.mmpa.magnetics.coil_wrench import KINDS, coil_wrench
 from lpvhinf.plant.mmpa.magnets import MagnetArray, magnet_array
 from lpvhinf.plant.mmpa.mover import Mover, mover
 from lpvhinf.plant.mmpa.parameters import MMPAParameters
 from lpvhinf.plant.mmpa.sensors import SENSOR_NAMES, InterferometerMap
+from lpvhinf.plant.modal import ModalModel
 from lpvhinf.plant.modal_form import modal_form
 from lpvhinf.progress import SILENT, Progress
 
@@ -97,6 +99,11 @@ def benchmark(
 
     def field(kind: str | CoilWrench, layers: tuple[CoilLayer, ...], magnets: MagnetArray) -> CoilWrench:
         if not isinstance(kind, str):
+            if not (callable(getattr(kind, "wrench", None)) and hasattr(kind, "n_coils")):
+                raise DomainError(
+                    f"magnetics or commutation is {kind!r}, wanted one of {', '.join(KINDS)}, or an object with "
+                    "`n_coils` and `wrench`, as CoilWrench describes it."
+                )
             return kind
         return coil_wrench(given, layers, magnets, kind=kind, cache=cache, jobs=jobs, progress=progress)
 
@@ -135,6 +142,8 @@ def benchmark(
         shift = np.array(deviations.commutation_misalignment)
         believes = _mechanical(given, known_mover, known_coils, shift, Effects())
         known = modal_form(believes, n_modes=n_modes, rigid_body_modes=known_mover.rigid_body_modes)
+        if true_mover is not known_mover:
+            modal = _with_signs_of(modal, known, known_mover.M)
     return MMPA(
         parameters=given,
         effects=deviations,
@@ -162,6 +171,13 @@ def _mechanical(
         input_names=tuple(f"i{k + 1}" for k in range(coils.n_coils)),
         output_names=SENSOR_NAMES,
     )
+
+
+def _with_signs_of(modal: ModalModel, known: ModalModel, mass: Array) -> ModalModel:
+    """The true modes with the signs of the known ones: a small payload can turn the usual choice of a sign round."""
+    assert modal.V is not None and known.V is not None  # both come from mechanical models
+    signs = np.where(np.einsum("ik,ik->k", known.V, mass @ modal.V) < 0.0, -1.0, 1.0)
+    return replace(modal, V=modal.V * signs)
 
 
 def _check_misalignment(parameters: MMPAParameters, effects: Effects) -> None:

@@ -138,8 +138,8 @@ class MMPAParameters:
     turns: int = 100
     filaments_width: int = 6
     filaments_height: int = 3
-    window_short: tuple[float, float] = (0.050, 0.214)
-    window_long: tuple[float, float] = (0.153, 0.194)
+    window_short: tuple[float, float] = (0.140, 0.230)
+    window_long: tuple[float, float] = (0.160, 0.240)
     window_order: int = 2
     travel: float = 0.060
     point_of_control: tuple[float, float, float] = (0.0, 0.0, 0.0)
