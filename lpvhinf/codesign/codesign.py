@@ -153,6 +153,7 @@ def codesign(
                 time_limit=time_limit,
                 progress=progress,
                 checkpoint=checkpoint,
+                bound=False,  # of every position, for every pass: many times the work of the design
             )
             if best is not None and result.gamma > (1.0 - PASS_GAIN) * best.gamma:
                 return min(best, result, key=lambda r: r.gamma)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lpvhinf.checks import Array
 from lpvhinf.hinfstruct.loop import LoopFactory, augmented_gain
@@ -30,8 +31,8 @@ class ClosedLoops:
         self.n_states = structure.n_x + max(P.n_x for P in plants)
         self.scale = max(float(np.max(np.abs(np.linalg.eigvals(P.A)), initial=1e-3)) for P in plants)
         self._scheduled = any(p is not None for p in points)
-        self._constant: dict[int, Array] | None = None
-        self._looked = False
+        self._slopes: dict[int, tuple[Array, NDArray[np.intp]]] = {}
+        self._latest: dict[int, tuple[Array, Array]] = {}
 
     def gains(self, theta: Array) -> list[Array]:
         """The augmented gain of every plant."""
@@ -39,39 +40,40 @@ class ClosedLoops:
             return [augmented_gain(*self.structure.realize(theta, None))] * len(self.factories)
         return [augmented_gain(*self.structure.realize(theta, p)) for p in self.points]
 
-    @property
-    def affine(self) -> bool:
-        """True if the controller's matrices look affine in theta: their derivatives agree at random parameters.
+    def _constant(self, plant: int) -> tuple[Array, NDArray[np.intp]]:
+        """Derivatives of the augmented gain at random parameters, and the parameters for which they change (n_c,).
 
-        It only decides whether second derivatives of the structure are computed for the models of the minimisers.
+        The matrices are affine in the other parameters, whose derivatives are the same everywhere and whose second
+        derivatives vanish. It only decides what is computed for the models of the minimisers.
         """
-        if not self._looked:
-            self._looked = True
+        key = plant if self._scheduled else 0
+        if key not in self._slopes:
             rng = np.random.default_rng(0)
             n = self.structure.n_parameters
-            samples = [rng.standard_normal(n) for _ in range(3)]
-            constant: dict[int, Array] = {}
-            for plant in range(len(self.factories) if self._scheduled else 1):
-                with np.errstate(over="ignore", invalid="ignore"):
-                    slopes = [self._differences(theta, plant) for theta in samples]
-                size = float(np.max(np.abs(slopes[0]), initial=1e-300))
-                if not all(np.max(np.abs(s - slopes[0]), initial=0.0) <= 1e-7 * size for s in slopes[1:]):
-                    return False
-                constant[plant] = np.mean(slopes, axis=0)
-            self._constant = constant
-        return self._constant is not None
+            with np.errstate(over="ignore", invalid="ignore"):
+                slopes = [self._differences(rng.standard_normal(n), plant, range(n)) for _ in range(3)]
+            size = float(np.max(np.abs(slopes[0]), initial=1e-300))
+            change = np.max([np.max(np.abs(s - slopes[0]), axis=(1, 2), initial=0.0) for s in slopes[1:]], axis=0)
+            curved = np.flatnonzero(~(change <= 1e-7 * size))  # also where a number is not finite
+            self._slopes[key] = np.mean(slopes, axis=0), curved
+        return self._slopes[key]
 
     def directions(self, theta: Array, plant: int) -> Array:
         """Derivatives of the augmented gain, (n_parameters, n_K + n_u, n_K + n_y)."""
-        if self.affine:
-            assert self._constant is not None
-            return self._constant[plant if self._scheduled else 0]
-        return self._differences(theta, plant)
+        slopes, curved = self._constant(plant)
+        if curved.size == 0:
+            return slopes
+        key = plant if self._scheduled else 0
+        if key not in self._latest or not np.array_equal(self._latest[key][0], theta):
+            slopes = slopes.copy()
+            slopes[curved] = self._differences(theta, plant, curved)
+            self._latest[key] = theta.copy(), slopes
+        return self._latest[key][1]
 
-    def _differences(self, theta: Array, plant: int) -> Array:
+    def _differences(self, theta: Array, plant: int, which: Iterable[int]) -> Array:
         p = self.points[plant]
         out = []
-        for k in range(theta.size):
+        for k in which:
             step = np.zeros_like(theta)
             step[k] = 1e-5 * max(1.0, abs(theta[k]))
             above = augmented_gain(*self.structure.realize(theta + step, p))
@@ -80,15 +82,14 @@ class ClosedLoops:
 
     def bend(self, theta: Array, plant: int, G: Array) -> Array:
         """Second derivative of the inner product of G with the augmented gain, by differences of the pullback."""
-        if self.affine:
-            return np.zeros((theta.size, theta.size))
-        rows = []
-        for k in range(theta.size):
+        _, curved = self._constant(plant)
+        H = np.zeros((theta.size, theta.size))
+        for k in curved:
             step = np.zeros_like(theta)
             step[k] = 1e-5 * max(1.0, abs(theta[k]))
             above, below = self.pullback(theta + step, plant, G), self.pullback(theta - step, plant, G)
-            rows.append((above - below) / (2.0 * step[k]))
-        H = np.array(rows)
+            H[k] = (above - below) / (2.0 * step[k])
+        H[:, np.setdiff1d(np.arange(theta.size), curved)] = 0.0  # round-off of the differences
         return np.asarray(0.5 * (H + H.T))
 
     def pullback(self, theta: Array, plant: int, G: Array) -> Array:

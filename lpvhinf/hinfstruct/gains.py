@@ -9,9 +9,6 @@ from numpy.typing import ArrayLike
 
 from lpvhinf.checks import Array, finite_array, read_only, whole_number
 from lpvhinf.errors import DimensionError, DomainError
-from lpvhinf.hinfstruct.compose import BlockDiagonal as BlockDiagonal
-from lpvhinf.hinfstruct.compose import Scaled as Scaled
-from lpvhinf.hinfstruct.fixed_order import FixedOrder as FixedOrder
 from lpvhinf.hinfstruct.structures import Realization
 
 

@@ -10,6 +10,8 @@ from lpvhinf.checks import Array
 if TYPE_CHECKING:
     import control
 
+    from lpvhinf.hinfstruct.goals import GoalValue
+
 
 @dataclass(frozen=True, kw_only=True)
 class PhaseRecord:
@@ -93,6 +95,10 @@ class HinfstructResult:
     evaluations : Evaluations
     stabilizing : bool
         Every closed loop is Hurwitz.
+    constraints : tuple of GoalValue
+        Every constraint on its worst plant, recomputed exactly; its level is not above zero.
+    objective : float or None
+        The objective that was minimised in place of gamma, recomputed exactly; None where gamma was.
     """
 
     gamma: float
@@ -108,6 +114,8 @@ class HinfstructResult:
     history: tuple[PhaseRecord, ...]
     evaluations: Evaluations
     stabilizing: bool
+    constraints: tuple[GoalValue, ...] = ()
+    objective: float | None = None
 
     def __repr__(self) -> str:
         return (

@@ -38,11 +38,11 @@ def test_the_weight_covers_between_its_positions(rigid: Design, flexible: Flexib
 
 
 def test_positions_that_are_not_covered_join_the_fit(rigid: Design) -> None:
-    """Fitted to the centre alone, without a margin: what is checked decides."""
-    once = flexible_uncertainty(rigid.assembly, [[0.0]], order=2, margin=1.0, n_check=16, rounds=1)
-    more = flexible_uncertainty(rigid.assembly, [[0.0]], order=2, margin=1.0, n_check=16, rounds=5)
-    assert once.coverage.ratio > 1.2
-    assert more.coverage.ratio < 1.01
+    """Fitted to the centre alone: what is checked decides."""
+    once = flexible_uncertainty(rigid.assembly, [[0.0]], order=2, margin=1.05, n_check=16, rounds=1)
+    more = flexible_uncertainty(rigid.assembly, [[0.0]], order=2, margin=1.05, n_check=16, rounds=5)
+    assert once.coverage.ratio > 1.1
+    assert more.coverage.covered
 
 
 def test_the_nominal_plant_is_the_rigid_body(rigid: Design, flexible: FlexibleUncertainty) -> None:
