@@ -19,6 +19,8 @@ HOPELESS = 1.5
 BATCH, SMALL_BATCH = 8, 2
 #: Rounds of the polish: iterations, and the part of a batch that takes part.
 ROUNDS = ((25, 0.5), (50, 0.25))
+#: Starts that are polished at least: who leads after the descent need not lead at the end.
+LEAST_POLISHED = 2
 #: Evaluations that an adaptive search may take, in evaluations of a small loop.
 EFFORT = 8500.0
 #: What an iteration of the polish costs, in such evaluations, and more for every parameter.
@@ -134,7 +136,7 @@ def _polish(
         ranked = [o for o in pool.ranked() if o.start in batch]
         level = max(HOPELESS * pool.ranked()[0].gamma, SMALLEST)
         chosen = [o for o in _distinct(ranked) if o.gamma <= level and not o.finished]
-        chosen = chosen[: max(1, round(part * len(batch)))]
+        chosen = chosen[: max(LEAST_POLISHED, round(part * len(batch)))]
         count = min(iterations, max_iterations)
         tasks = [replace(make(o.start, o.theta), iterations=count, radius=o.radius) for o in chosen]
         pool.add(runner.map(polish, tasks, share=0.4))
