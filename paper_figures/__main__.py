@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from lpvhinf.errors import DomainError, LpvHinfError, StorageError
-from lpvhinf.storage import read_json
+from lpvhinf.cli.exit_status import exit_status
+from lpvhinf.errors import DomainError
 from paper_figures import (
     damping_trade,
     plant_coil_currents,
@@ -19,6 +19,7 @@ from paper_figures import (
     plant_top_view,
     six_block,
 )
+from studies.results import of_the_study
 
 # The figures of each study; a results folder says in settings.json which study it comes from.
 FIGURES: dict[str, dict[str, Any]] = {
@@ -30,22 +31,25 @@ FIGURES: dict[str, dict[str, Any]] = {
 }
 
 
-def figures_of(results: Path) -> dict[str, Any]:
-    """The figures of the study that a results folder comes from.
+def draw(name: str | None, source: Path, out: Path) -> None:
+    """Draw one figure of a results folder, or all of its study.
 
     Raises
     ------
+    DomainError
+        If the figure belongs to another study.
     StorageError
-        If the folder does not say, or the study has no figures.
+        If the folder does not say which study it comes from, or lacks data.
     """
-    settings = read_json(results / "settings.json")
-    study = settings.get("study") if isinstance(settings, dict) else None
-    if study not in FIGURES:
-        raise StorageError(
-            f"{results / 'settings.json'} names the study {study!r}, wanted one of {', '.join(FIGURES)}. "
-            "Run the study again."
+    figures = of_the_study(source, FIGURES)
+    if name is not None and name not in figures:
+        raise DomainError(
+            f"{source} has no data for the figure {name!r}, only for {', '.join(sorted(figures))}. "
+            "Name the folder of the study that it belongs to."
         )
-    return FIGURES[study]
+    for one in [name] if name else sorted(figures):
+        for path in figures[one].make(source, out):
+            print(path)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -56,20 +60,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--from", dest="source", type=Path, required=True, help="results folder of a study")
     parser.add_argument("--out", type=Path, required=True, help="folder for the figures")
     arguments = parser.parse_args(argv)
-    try:
-        figures = figures_of(arguments.source)
-        if arguments.name is not None and arguments.name not in figures:
-            raise DomainError(
-                f"{arguments.source} has no data for the figure {arguments.name!r}, only for "
-                f"{', '.join(sorted(figures))}. Name the folder of the study that it belongs to."
-            )
-        for name in [arguments.name] if arguments.name else sorted(figures):
-            for path in figures[name].make(arguments.source, arguments.out):
-                print(path)
-    except LpvHinfError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
-    return 0
+    return exit_status(lambda: draw(arguments.name, arguments.source, arguments.out))
 
 
 if __name__ == "__main__":

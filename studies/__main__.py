@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from lpvhinf.cli.exit_status import exit_status
 from lpvhinf.cli.terminal import TerminalProgress
-from lpvhinf.errors import LpvHinfError, StorageError
-from lpvhinf.storage import read_json
 from studies import output_observer, plant
+from studies.results import of_the_study
 from studies.settings import load_settings
 
 STUDIES: dict[str, Any] = {output_observer.NAME: output_observer, plant.NAME: plant}
@@ -32,39 +32,24 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
-def study_of(folder: Path) -> Any:
-    """The study that a results folder comes from; a `StorageError` if it does not say so."""
-    settings = read_json(folder / "settings.json")
-    name = settings.get("study") if isinstance(settings, dict) else None
-    if name not in STUDIES:
-        raise StorageError(
-            f"{folder / 'settings.json'} names the study {name!r}, wanted one of {', '.join(STUDIES)}. "
-            "Run the study again."
-        )
-    return STUDIES[name]
+def carry_out(arguments: argparse.Namespace) -> None:
+    """The command that the arguments name."""
+    if arguments.command == "list":
+        for name, study in STUDIES.items():
+            print(f"{name}: {(study.__doc__ or '').splitlines()[0]}")
+    elif arguments.command == "run":
+        study = STUDIES[arguments.name]
+        settings = load_settings(study.Settings, arguments.name, arguments.preset, jobs=arguments.jobs)
+        with TerminalProgress() as progress:
+            study.run(settings, arguments.out or Path("results") / arguments.name, progress)
+    else:
+        of_the_study(arguments.folder, STUDIES).write_report(arguments.folder)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run; the exit status is 0, 1 after an error of ours, 130 after an interrupt."""
     arguments = parser().parse_args(argv)
-    try:
-        if arguments.command == "list":
-            for name, study in STUDIES.items():
-                print(f"{name}: {(study.__doc__ or '').splitlines()[0]}")
-        elif arguments.command == "run":
-            study = STUDIES[arguments.name]
-            settings = load_settings(study.Settings, arguments.name, arguments.preset, jobs=arguments.jobs)
-            with TerminalProgress() as progress:
-                study.run(settings, arguments.out or Path("results") / arguments.name, progress)
-        else:
-            study_of(arguments.folder).write_report(arguments.folder)
-    except LpvHinfError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("interrupted: run the same command again to go on", file=sys.stderr)
-        return 130
-    return 0
+    return exit_status(lambda: carry_out(arguments), interrupted="run the same command again to go on")
 
 
 if __name__ == "__main__":

@@ -34,7 +34,9 @@ from lpvhinf.progress import SILENT, Progress
 from lpvhinf.statespace import LPVStateSpace
 from lpvhinf.storage import make_folder, read_arrays, read_json, write_arrays, write_json
 from studies.output_observer_report import write_report
+from studies.positions import grid
 from studies.record import run_record
+from studies.results import belongs
 from studies.settings import fingerprint
 
 NAME = "output_observer"
@@ -152,7 +154,7 @@ def finished(folder: Path, key: str) -> bool:
             LPVStateSpace.load(folder / f"{name}.npz")
     except StorageError:
         return False
-    return isinstance(summary, dict) and summary.get("fingerprint") == key
+    return belongs(summary, key)
 
 
 def decoupled_plant(settings: Settings, job: Job, progress: Progress = SILENT) -> DecoupledPlant:
@@ -164,12 +166,6 @@ def decoupled_plant(settings: Settings, job: Job, progress: Progress = SILENT) -
         sensing=job.sensing,
         degree=settings.degree,
     )
-
-
-def grid(box: Array, n: int) -> Array:
-    """A grid of n positions per axis, (n^n_p, n_p)."""
-    axes = [np.linspace(low, high, n) for low, high in box]
-    return np.stack([x.ravel() for x in np.meshgrid(*axes, indexing="ij")], axis=-1)
 
 
 def run_design(settings: Settings, job: Job, out: Path, progress: Progress) -> None:

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from lpvhinf.errors import StorageError
 from lpvhinf.storage import read_json, write_json, write_text
+from studies.results import summaries
 
 CROSSOVER_TOLERANCE = 0.10
 PEAK_REDUCTION_DB = 15.0
@@ -16,7 +16,7 @@ PEAK_REDUCTION_DB = 15.0
 
 def write_report(out: Path) -> None:
     """Write report.json and report.md."""
-    settings, designs = read_json(out / "settings.json"), summaries(out)
+    settings, designs = read_json(out / "settings.json"), summaries(out, "design")
     report = {
         "settings": settings,
         "run": read_json(out / "run.json"),
@@ -25,23 +25,6 @@ def write_report(out: Path) -> None:
     }
     write_json(out / "report.json", report)
     write_text(out / "report.md", markdown(report))
-
-
-def summaries(out: Path) -> dict[str, Any]:
-    """The summaries of the designs that belong to the folder's settings, in their order.
-
-    Raises
-    ------
-    StorageError
-        If one is missing, or was made with other settings.
-    """
-    designs = {}
-    for name, key in read_json(out / "designs.json").items():
-        summary = read_json(out / "designs" / name / "summary.json")
-        if not isinstance(summary, dict) or summary.get("fingerprint") != key:
-            raise StorageError(f"the design {name!r} in {out} comes from other settings. Run the study again.")
-        designs[name] = summary
-    return designs
 
 
 def claims(designs: dict[str, Any]) -> list[dict[str, Any]]:

@@ -18,7 +18,6 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Callable
-from importlib.metadata import version
 from pathlib import Path
 
 import lpvhinf
@@ -73,9 +72,7 @@ def run(settings: Settings, out: Path, progress: Progress) -> None:
         # the tables are built once, over all processes, before the parts want them
         benchmark(magnetics=settings.magnetics, jobs=settings.jobs, progress=progress)
     run_jobs(run_part, [(name, (settings, name, out)) for name in keys], jobs=settings.jobs, progress=progress)
-    record = run_record(seed=settings.seed, began=began)
-    record["versions"]["magpylib"] = version("magpylib")
-    write_json(out / "run.json", record)
+    write_json(out / "run.json", run_record(seed=settings.seed, began=began))
     write_report(out)
     progress.log(f"report in {out / 'report.md'}")
 

@@ -12,7 +12,8 @@ from lpvhinf.decoupling import DecoupledPlant, decouple
 from lpvhinf.plant.mmpa import Effects, benchmark
 from lpvhinf.progress import Progress
 from studies.plant_results import Found
-from studies.plant_settings import Settings, actuator, grid
+from studies.plant_settings import Settings, actuator
+from studies.positions import grid
 
 UM = 1e-6
 

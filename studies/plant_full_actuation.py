@@ -10,7 +10,8 @@ import numpy as np
 from lpvhinf.decoupling import ChannelCoupling, decouple
 from lpvhinf.progress import Progress
 from studies.plant_results import Found
-from studies.plant_settings import Settings, actuator, grid
+from studies.plant_settings import Settings, actuator
+from studies.positions import grid
 
 FIELDS = ("rigid", "rigid_channel", "excitation", "modal_to_rigid", "own_gain_min", "own_gain_max")
 

@@ -9,8 +9,9 @@ from lpvhinf.plant.mmpa import MMPA, weighted_pseudo_inverse
 from lpvhinf.progress import Progress
 from studies.plant_currents import CURRENT_LIMIT, LOADS, load_currents
 from studies.plant_results import Found
-from studies.plant_settings import Settings, actuator, grid
+from studies.plant_settings import Settings, actuator
 from studies.plant_summary import mode_signs
+from studies.positions import grid
 
 LEVER = 0.1  # [m]: torques are those of one newton at this lever
 

@@ -7,12 +7,13 @@ from typing import Any
 
 from lpvhinf.storage import read_arrays, read_json, write_json, write_text
 from studies import plant_tables
-from studies.plant_results import ARRAYS, summaries
+from studies.plant_results import ARRAYS
+from studies.results import summaries
 
 
 def write_report(out: Path) -> None:
     """Write report.json and report.md."""
-    settings, parts = read_json(out / "settings.json"), summaries(out)
+    settings, parts = read_json(out / "settings.json"), summaries(out, "part")
     plate = read_arrays(out / "parts" / "validation" / "arrays.npz", ARRAYS)
     report = {
         "settings": settings,

@@ -11,7 +11,8 @@ from lpvhinf.plant.mmpa import MMPA
 from lpvhinf.plant.modal import Residual
 from lpvhinf.progress import Progress
 from studies.plant_results import Found
-from studies.plant_settings import Settings, actuator, grid
+from studies.plant_settings import Settings, actuator
+from studies.positions import grid
 
 CHANNELS = ("z", "rx", "ry")  # of the decoupled plant; the last channel is z at the point of control
 INDEX = [2, 3, 4]

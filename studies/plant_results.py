@@ -9,6 +9,7 @@ from typing import Any
 
 from lpvhinf.errors import StorageError
 from lpvhinf.storage import read_arrays, read_json, write_arrays, write_json
+from studies.results import belongs
 
 ARRAYS = "lpvhinf.PlantStudy"
 
@@ -34,21 +35,4 @@ def finished(folder: Path, key: str) -> bool:
         summary = read_json(folder / "summary.json")
     except StorageError:
         return False
-    return isinstance(summary, dict) and summary.get("fingerprint") == key
-
-
-def summaries(out: Path) -> dict[str, Any]:
-    """The summaries of all parts of a results folder, in their order.
-
-    Raises
-    ------
-    StorageError
-        If one is missing, or was made with other settings.
-    """
-    found = {}
-    for name, key in read_json(out / "parts.json").items():
-        summary = read_json(out / "parts" / name / "summary.json")
-        if not isinstance(summary, dict) or summary.get("fingerprint") != key:
-            raise StorageError(f"the part {name!r} in {out} comes from other settings. Run the study again.")
-        found[name] = summary
-    return found
+    return belongs(summary, key)

@@ -91,12 +91,6 @@ def _actuator(magnetics: str, n_flex: int) -> MMPA:
     return benchmark(n_flex=n_flex, magnetics=magnetics)
 
 
-def grid(box: Array, n: int) -> Array:
-    """A grid of n positions per axis, the first axis slowest, (n^n_p, n_p)."""
-    axes = [np.linspace(low, high, n) for low, high in box]
-    return np.stack([x.ravel() for x in np.meshgrid(*axes, indexing="ij")], axis=-1)
-
-
 def random_positions(settings: Settings, box: Array) -> Array:
     """Positions that no fit has seen, (n_random, n_p)."""
     rng = np.random.default_rng(settings.seed)

@@ -12,7 +12,8 @@ from lpvhinf.plant.mmpa import MMPA, weighted_pseudo_inverse
 from lpvhinf.progress import Progress
 from studies.plant_currents import CURRENT_LIMIT, LOADS, active_coils, copper_loss, load_currents
 from studies.plant_results import Found
-from studies.plant_settings import Settings, actuator, grid
+from studies.plant_settings import Settings, actuator
+from studies.positions import grid
 
 LEVER = 0.1  # [m]: torques count as forces at this lever in the condition numbers
 N_MODAL_ROWS = 5

@@ -12,7 +12,8 @@ from lpvhinf.progress import Progress
 from studies.plant_currents import LOADS, active_coils, copper_loss, load_currents
 from studies.plant_polynomial import KINDS, gain_errors, relative
 from studies.plant_results import Found
-from studies.plant_settings import Settings, actuator, grid, random_positions, windowed
+from studies.plant_settings import Settings, actuator, random_positions, windowed
+from studies.positions import grid
 
 
 def windows(settings: Settings, progress: Progress) -> Found:

@@ -8,7 +8,7 @@ import time
 from importlib.metadata import version
 from typing import Any
 
-PACKAGES = ("lpvhinf", "numpy", "scipy", "control", "slycot", "piqp", "clarabel", "matplotlib")
+PACKAGES = ("lpvhinf", "numpy", "scipy", "control", "slycot", "piqp", "clarabel", "magpylib", "matplotlib")
 
 
 def run_record(*, seed: int, began: float) -> dict[str, Any]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 
 import lpvhinf
+from lpvhinf.cli.exit_status import exit_status
 from lpvhinf.cli.terminal import TerminalProgress
-from lpvhinf.errors import DomainError, LpvHinfError
+from lpvhinf.errors import DomainError
 from lpvhinf.storage import make_folder
 
 
@@ -34,24 +34,21 @@ def parser() -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run; the exit status is 0, 1 after an error of ours, 130 after an interrupt."""
     arguments = parser().parse_args(argv)
-    try:
-        specification = read_specification(arguments.settings)
-        make_folder(arguments.out)  # before the work, which would else be lost
-        with TerminalProgress() as progress:
-            actuator = lpvhinf.mmpa.benchmark(
-                n_flex=arguments.plant_modes, magnetics=arguments.magnetics, progress=progress
-            )
-            plant = lpvhinf.decouple(actuator, n_flex=arguments.n_flex)
-            design = lpvhinf.codesign(plant, arguments.architecture, specification, progress=progress)
-        design.save(arguments.out)
-        print(design.report())
-    except LpvHinfError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("interrupted: nothing was written", file=sys.stderr)
-        return 130
-    return 0
+    return exit_status(lambda: design(arguments), interrupted="nothing was written")
+
+
+def design(arguments: argparse.Namespace) -> None:
+    """The command `design`: make one, store it, print its report."""
+    specification = read_specification(arguments.settings)
+    make_folder(arguments.out)  # before the work, which would else be lost
+    with TerminalProgress() as progress:
+        actuator = lpvhinf.mmpa.benchmark(
+            n_flex=arguments.plant_modes, magnetics=arguments.magnetics, progress=progress
+        )
+        plant = lpvhinf.decouple(actuator, n_flex=arguments.n_flex)
+        made = lpvhinf.codesign(plant, arguments.architecture, specification, progress=progress)
+    made.save(arguments.out)
+    print(made.report())
 
 
 def read_specification(path: Path | None) -> lpvhinf.Specification:

@@ -151,13 +151,15 @@ class DecoupledPlant:
         redundant = self.redundancy - (self.redundancy @ rigid) @ T_rb
         T_y = np.concatenate([S @ T_rb, redundant], axis=1)
         if self.actuation == "full":
-            forces = input_decoupling(inputs[:, :n_rb], weights)
+            forces = input_decoupling(inputs[:, :n_rb], weights, positions=points)
             T_u = forces @ shared_inputs(inputs[:, n_rb:n_ctrl] @ forces, self.mode_weight)
         else:
-            T_u = input_decoupling(inputs[:, :n_ctrl], weights)
+            T_u = input_decoupling(inputs[:, :n_ctrl], weights, positions=points)
         if self.input_decoupling == "rigid-body":
             # the conventional rigid inputs know nothing of flexible modes; the modal inputs stay the extended ones
-            T_u = np.concatenate([input_decoupling(inputs[:, :n_rb], weights), T_u[:, :, n_rb:]], axis=2)
+            T_u = np.concatenate(
+                [input_decoupling(inputs[:, :n_rb], weights, positions=points), T_u[:, :, n_rb:]], axis=2
+            )
         return T_y, np.concatenate([T_u[:, :, :n_rb] @ np.linalg.inv(S), T_u[:, :, n_rb:]], axis=2)
 
     def _weights(self, points: Array, n_u: int) -> Array | None:
@@ -184,7 +186,8 @@ class DecoupledPlant:
             believed = self.known._gains(where, known, known)
             seen = np.sum(gains.C[:, :, n_rb:n_ctrl] * believed.C[:, :, n_rb:n_ctrl], axis=(0, 1))
             B[:, n_rb:] *= np.where(seen < 0.0, -1.0, 1.0)[:, None]
-        forces = input_decoupling(known.input_gains[:, :n_rb], self._weights(where, known.input_gains.shape[2]))
+        weights = self._weights(where, known.input_gains.shape[2])
+        forces = input_decoupling(known.input_gains[:, :n_rb], weights, positions=where)
         return channel_coupling(where, B, true.input_gains[:, n_rb:n_ctrl] @ forces)
 
     @cached_property

@@ -38,7 +38,7 @@ def output_decoupling(output_gains: Array) -> Array:
             f"{n_y} sensors cannot tell {n_rb} rigid-body modes apart. Add sensors, or keep fewer modes."
         )
     modes = np.swapaxes(output_gains, 1, 2)
-    worst = _worst_condition(modes)
+    worst = float(np.max(_conditions(modes)))
     if worst > MAX_CONDITION:
         raise AssumptionError(
             f"the sensors do not observe every rigid-body mode: condition number {worst:.2g}, wanted below "
@@ -48,7 +48,7 @@ def output_decoupling(output_gains: Array) -> Array:
     return np.asarray(np.swapaxes(np.linalg.pinv(modes / size), 1, 2) / size)
 
 
-def input_decoupling(input_gains: Array, weights: Array | None = None) -> Array:
+def input_decoupling(input_gains: Array, weights: Array | None = None, *, positions: Array | None = None) -> Array:
     r"""T_u: actuator commands that drive one mode each, :math:`T_u = W B^\top (B W B^\top)^{-1}`.
 
     With W = I this is the pseudo-inverse of eq. 6; with the rows of flexible modes in B it is the
@@ -61,6 +61,8 @@ def input_decoupling(input_gains: Array, weights: Array | None = None) -> Array:
         Modal forces per unit of every actuator, at N positions.
     weights : (N, n_u), optional
         At least zero; zero takes an actuator out.
+    positions : (N, n_p), optional
+        The positions p that the gains belong to, for the messages.
 
     Returns
     -------
@@ -81,27 +83,34 @@ def input_decoupling(input_gains: Array, weights: Array | None = None) -> Array:
     n_controlled, n_u = input_gains.shape[1:]
     if weights is not None and np.any(weights < 0.0):
         raise DomainError(f"the weights have the entry {np.min(weights):.4g}, wanted entries of at least 0.")
-    active = n_u if weights is None else int(np.min(np.sum(weights > 0.0, axis=1)))
-    if active < n_controlled:
+    active = np.full(len(input_gains), n_u) if weights is None else np.sum(weights > 0.0, axis=1)
+    fewest = int(np.argmin(active))
+    if active[fewest] < n_controlled:
         raise AssumptionError(
-            f"{active} active actuators cannot drive {n_controlled} modes independently. "
+            f"{active[fewest]} active actuators cannot drive {n_controlled} modes independently"
+            f"{_at(positions, fewest)}. "
             f"Wanted at least {n_controlled}: add actuators, lower n_flex, or decouple with actuation='full'."
         )
     root = np.ones((len(input_gains), 1, n_u)) if weights is None else np.sqrt(weights)[:, None, :]
     weighted = input_gains * root
-    worst = _worst_condition(weighted)
-    if worst > MAX_CONDITION:
+    conditions = _conditions(weighted)
+    worst = int(np.argmax(conditions))
+    if conditions[worst] > MAX_CONDITION:
         raise AssumptionError(
-            f"the actuators cannot drive {n_controlled} modes independently: condition number {worst:.2g}, wanted "
-            f"below {MAX_CONDITION:.0g}. Add actuators or lower n_flex."
+            f"the actuators cannot drive {n_controlled} modes independently: condition number {conditions[worst]:.2g}"
+            f"{_at(positions, worst)}, wanted below {MAX_CONDITION:.0g}. Add actuators or lower n_flex."
         )
     size = np.linalg.norm(weighted, axis=2, keepdims=True)
     return np.asarray(np.swapaxes(root, 1, 2) * np.linalg.pinv(weighted / size) / np.swapaxes(size, 1, 2))
 
 
-def _worst_condition(matrices: Array) -> float:
-    """Largest condition number after the rows, one a mode, are normalised: units of the modes do not count."""
+def _at(positions: Array | None, i: int) -> str:
+    """Where, for a message."""
+    return "" if positions is None else f" at p = {positions[i].tolist()}"
+
+
+def _conditions(matrices: Array) -> Array:
+    """Condition numbers after the rows, one a mode, are normalised: units of the modes do not count."""
     rows = np.linalg.norm(matrices, axis=2, keepdims=True)
-    if np.any(rows == 0.0):
-        return float("inf")
-    return float(np.max(np.linalg.cond(matrices / rows)))
+    dead = np.any(rows == 0.0, axis=(1, 2))
+    return np.where(dead, np.inf, np.linalg.cond(matrices / np.where(rows == 0.0, 1.0, rows)))

@@ -62,6 +62,17 @@ def test_too_few_actuators() -> None:
         input_decoupling(gains(2, 3, 4), off)
 
 
+def test_messages_name_the_position() -> None:
+    B, where = gains(2, 3, 7), np.array([[0.0, 0.0], [0.01, -0.02]])
+    off = np.ones((2, 7))
+    off[1, :5] = 0.0
+    with pytest.raises(AssumptionError, match=r"2 active actuators .* at p = \[0.01, -0.02\]"):
+        input_decoupling(B, off, positions=where)
+    B[1, 2] = B[1, 0] - 2.0 * B[1, 1]
+    with pytest.raises(AssumptionError, match=r"condition number \S+ at p = \[0.01, -0.02\], wanted below"):
+        input_decoupling(B, positions=where)
+
+
 def test_too_few_sensors() -> None:
     with pytest.raises(AssumptionError, match="2 sensors cannot tell 3 rigid-body modes apart"):
         output_decoupling(gains(2, 2, 3))

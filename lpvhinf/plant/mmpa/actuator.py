@@ -13,11 +13,12 @@ from lpvhinf.plant.mechanical import MechanicalModel
 from lpvhinf.plant.mmpa.coils import CoilLayer
 from lpvhinf.plant.mmpa.commutation import coil_weights, weighted_pseudo_inverse
 from lpvhinf.plant.mmpa.effects import Effects
-from lpvhinf.plant.mmpa.mover import RIGID_BODY_NAMES, Mover
+from lpvhinf.plant.mmpa.mover import Mover
 from lpvhinf.plant.mmpa.parameters import MMPAParameters
 from lpvhinf.plant.mmpa.plate import RitzPlate
 from lpvhinf.plant.mmpa.point_of_control import PointOfControl
 from lpvhinf.plant.modal import ModalModel
+from lpvhinf.plant.rigid_motion import AXES
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -82,7 +83,7 @@ class MMPA:
     @property
     def rigid_body_names(self) -> tuple[str, ...]:
         """Order of the rigid-body modes."""
-        return RIGID_BODY_NAMES
+        return AXES
 
     @property
     def point_of_control(self) -> PointOfControl:

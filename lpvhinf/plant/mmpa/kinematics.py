@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from lpvhinf.checks import Array, finite_array
 from lpvhinf.plant.mmpa.plate import RitzPlate
+from lpvhinf.plant.rigid_motion import rigid_displacements
 
 IN_PLANE = 3  # coordinates x, y, rz before the Ritz coefficients
 
@@ -107,8 +108,6 @@ def rigid_transform(offsets: ArrayLike) -> Array:
     """
     d = finite_array("offsets", offsets)
     out = np.zeros((*d.shape[:-1], 6, 6))
-    out[...] = np.eye(6)
-    out[..., 0, 4], out[..., 0, 5] = d[..., 2], -d[..., 1]
-    out[..., 1, 3], out[..., 1, 5] = -d[..., 2], d[..., 0]
-    out[..., 2, 3], out[..., 2, 4] = d[..., 1], -d[..., 0]
+    out[..., :3, :] = rigid_displacements(d)
+    out[..., 3:, 3:] = np.eye(3)
     return out

@@ -9,6 +9,8 @@ import numpy as np
 from lpvhinf.checks import Array, read_only
 from lpvhinf.plant.mmpa.parameters import MMPAParameters
 
+TURN = -45.0  # degrees about z, of the array against the mover frame
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MagnetArray:

@@ -28,8 +28,6 @@ from lpvhinf.plant.mmpa.magnets import magnet_array, mirror_bars
 from lpvhinf.plant.mmpa.parameters import MMPAParameters
 from lpvhinf.plant.mmpa.plate import RitzPlate
 
-RIGID_BODY_NAMES = ("x", "y", "z", "rx", "ry", "rz")
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mover:

@@ -12,8 +12,6 @@ from lpvhinf.plant.mmpa.mover import Mover
 from lpvhinf.plant.mmpa.parameters import MMPAParameters
 from lpvhinf.plant.mmpa.plate import RitzPlate
 
-PERFORMANCE_NAMES = ("x", "y", "z", "rx", "ry", "rz")
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PointOfControl:

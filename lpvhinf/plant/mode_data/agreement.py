@@ -9,7 +9,8 @@ import numpy as np
 from lpvhinf.checks import Array
 from lpvhinf.errors import AssumptionError
 from lpvhinf.plant.mode_data.plausibility import Plausibility
-from lpvhinf.plant.mode_data.rigid_body import AXES, RigidBody
+from lpvhinf.plant.mode_data.rigid_body import RigidBody
+from lpvhinf.plant.rigid_motion import AXES
 
 OUT_OF_PLANE = ("z", "rx", "ry")
 DEPENDENT = 1e8  # condition number of the zero-frequency modes, rotations scaled by the mover's size

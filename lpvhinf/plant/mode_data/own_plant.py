@@ -17,8 +17,9 @@ from lpvhinf.plant.mode_data.actuators_sensors import DIRECTIONS, Actuator, Sens
 from lpvhinf.plant.mode_data.agreement import OUT_OF_PLANE
 from lpvhinf.plant.mode_data.mode_data import ModeData
 from lpvhinf.plant.mode_data.mode_shapes import EDGE, ModeShapes
-from lpvhinf.plant.mode_data.rigid_body import AXES, RigidBody, axis_indices
+from lpvhinf.plant.mode_data.rigid_body import RigidBody, axis_indices
 from lpvhinf.plant.mode_data.shape_fit import ShapeFit
+from lpvhinf.plant.rigid_motion import AXES
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

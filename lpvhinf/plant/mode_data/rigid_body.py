@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from lpvhinf.checks import Array, finite_array, positive, read_only
 from lpvhinf.errors import AssumptionError, DimensionError, DomainError
+from lpvhinf.plant.rigid_motion import AXES, rigid_displacements
 
-AXES = ("x", "y", "z", "rx", "ry", "rz")
 TRIANGLE_SLACK = 0.02  # data sheets round: 0.062 + 0.062 against 0.125
 
 
@@ -29,35 +29,6 @@ def axis_indices(axes: Sequence[str]) -> list[int]:
     if unknown or len(set(given)) != len(given) or not given:
         raise DomainError(f"axes is {given!r}, wanted different names out of {', '.join(AXES)}.")
     return [AXES.index(name) for name in given]
-
-
-def unit_motions(places: Array, centre: Array) -> Array:
-    r"""Displacements of material points for unit rigid-body motions about `centre`.
-
-    .. math:: d(r) = t + \theta \times (r - c)
-
-    Parameters
-    ----------
-    places : (..., 3) [m]
-    centre : (3,) [m]
-
-    Returns
-    -------
-    (..., 3, 6)
-        Columns x, y, z [m per m], rx, ry, rz [m per rad].
-
-    Examples
-    --------
-    >>> unit_motions(np.array([0.0, 0.2, 0.0]), np.zeros(3))[2].tolist()
-    [0.0, 0.0, 1.0, 0.2, 0.0, 0.0]
-    """
-    x, y, z = np.moveaxis(places - centre, -1, 0)
-    out = np.zeros((*places.shape, 6))
-    out[..., [0, 1, 2], [0, 1, 2]] = 1.0
-    out[..., 1, 3], out[..., 2, 3] = -z, y
-    out[..., 0, 4], out[..., 2, 4] = z, -x
-    out[..., 0, 5], out[..., 1, 5] = -y, x
-    return out
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -139,7 +110,7 @@ class RigidBody:
 
     def motions(self, places: ArrayLike, axes: Sequence[str] = AXES) -> Array:
         """Displacements (..., 3, n) of the points `places` (..., 3) [m] for unit motions along the given axes."""
-        return unit_motions(np.asarray(places, dtype=float), self.centre_of_gravity)[..., axis_indices(axes)]
+        return rigid_displacements(np.asarray(places, dtype=float) - self.centre_of_gravity)[..., axis_indices(axes)]
 
     def __repr__(self) -> str:
         centre, inertia = self.centre_of_gravity.tolist(), self.inertia.tolist()

@@ -31,15 +31,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import scipy.sparse
-from scipy.interpolate import BSpline, make_interp_spline
 
 from lpvhinf.checks import Array
 from lpvhinf.plant.mmpa.coils import CoilLayer
+from lpvhinf.plant.mmpa.magnets import TURN
 
 DEGREE = 5
 FIELD_SPACING = 1e-3  # m; the nearest conductor is about 2 mm from the magnets: errors near 1e-6 of the largest force
-TURN = -45.0  # degrees about z, of the array against the mover frame
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,6 +91,9 @@ class _Axis:
     """Quintic splines on a uniform grid along one axis, and their differences and integrals over the filaments."""
 
     def __init__(self, offsets: Array, halves: Array) -> None:
+        import scipy.sparse
+        from scipy.interpolate import BSpline, make_interp_spline
+
         n = int(np.ceil((np.max(np.abs(offsets)) + np.max(halves)) / FIELD_SPACING)) + 1
         self.grid = np.arange(-n, n + 1) * FIELD_SPACING
         t = make_interp_spline(self.grid, np.zeros(len(self.grid)), k=DEGREE).t
@@ -110,6 +111,8 @@ class _Axis:
 
 
 def _coefficients(values: Array, x: _Axis, y: _Axis) -> Array:
+    from scipy.interpolate import make_interp_spline
+
     along_x = make_interp_spline(x.grid, values, k=DEGREE, axis=0).c
     return np.asarray(make_interp_spline(y.grid, np.ascontiguousarray(along_x.T), k=DEGREE, axis=0).c.T)
 

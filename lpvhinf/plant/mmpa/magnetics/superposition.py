@@ -14,7 +14,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.ndimage
 
 from lpvhinf.checks import Array
 from lpvhinf.errors import AssumptionError
@@ -185,5 +184,7 @@ def superpose(single: list[Array], arrangement: Arrangement, grid: OffsetGrid, s
 
 
 def _spline_coefficients(table: Array) -> Array:
+    import scipy.ndimage
+
     once = scipy.ndimage.spline_filter1d(table, order=DEGREE, axis=0, mode="mirror")
     return np.asarray(scipy.ndimage.spline_filter1d(once, order=DEGREE, axis=1, mode="mirror"))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from lpvhinf.jobs import run_jobs
 from lpvhinf.plant.mmpa.magnetics import single_magnet
 from lpvhinf.plant.mmpa.magnetics.single_magnet import MagnetKind, Winding, single_magnet_wrench
 from lpvhinf.plant.mmpa.magnetics.superposition import OffsetGrid
+from lpvhinf.plant.mmpa.magnets import TURN
 from lpvhinf.progress import Progress
 from lpvhinf.storage import one_at_a_time, read_arrays, write_arrays
 
@@ -78,6 +78,8 @@ def _build(kind: MagnetKind, winding: Winding, grid: OffsetGrid, progress: Progr
 
 def _description(tasks: list[Task]) -> str:
     """Everything that the tables depend on, as text."""
+    from importlib.metadata import version
+
     parts = [
         {
             "size": kind.size,
@@ -88,7 +90,7 @@ def _description(tasks: list[Task]) -> str:
         }
         for kind, winding, grid in tasks
     ]
-    numerics = [FORMAT, single_magnet.FIELD_SPACING, single_magnet.DEGREE, single_magnet.TURN, version("magpylib")]
+    numerics = [FORMAT, single_magnet.FIELD_SPACING, single_magnet.DEGREE, TURN, version("magpylib")]
     return json.dumps([numerics, parts])
 
 

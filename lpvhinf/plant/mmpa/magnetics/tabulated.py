@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse
-from scipy.interpolate import BSpline
 
 from lpvhinf.checks import Array
 from lpvhinf.plant.mmpa.coils import CoilLayer
@@ -23,6 +21,9 @@ class LayerTable:
 
     def values(self, offsets: Array) -> Array:
         """The wrenches (n, rows) at offsets (n, 2) [m]; zero beyond the grid."""
+        import scipy.sparse
+        from scipy.interpolate import BSpline  # here, as it takes long to import and the first harmonic needs none
+
         t = offsets / self.grid.step + np.array([self.grid.n_x, self.grid.n_y])
         shape = np.array(self.coefficients.shape[:2])
         inside = np.flatnonzero(np.all((t >= STENCIL) & (t <= shape - 1 - STENCIL), axis=1))
