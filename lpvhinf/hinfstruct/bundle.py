@@ -5,20 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lpvhinf.checks import Array
+from lpvhinf.hinfstruct.cut_model import CutModel
 from lpvhinf.hinfstruct.metric import unit_steps
 from lpvhinf.hinfstruct.problem import Budget, Cut, Oracle, Point
 from lpvhinf.hinfstruct.quasi_newton import Descent
-from lpvhinf.hinfstruct.subproblem import Subproblem, curved_step, quadratic_model, shortest_combination
 
 #: First radius of the trust region, in unit steps of the metric.
 FIRST_RADIUS = 0.3
 #: Accepted steps for which cuts that decided are remembered.
 MEMORY = 3
-#: Cuts lower than this multiple of the decrease of the linear model count as straight.
-MET = 3.0
+#: Iterations without a gain of the tolerance in all after which the polish ends.
+PATIENCE = 12
 #: Parts of the radius that are tried before a model is given up.
 SHRINK = (1.0, 0.1, 0.01, 1e-3)
 
@@ -48,35 +47,36 @@ def bundle(
     """
     point = start
     n = point.theta.size
-    F = np.zeros((n, n))
+    F: Array | None = None
     radius = FIRST_RADIUS if radius is None else radius
     missed: list[Point] = []
     earlier: list[list[Cut]] = []
-    slow, fresh = 0, True
+    slow = 0
+    level, since = start.value, 0
+    model: CutModel | None = None
     for iteration in range(max_iterations):
         cuts = oracle.cuts(point, missed, [cut for step in earlier for cut in step])
-        G = np.array([cut.gradient for cut in cuts])
-        hard = np.array([cut.hard for cut in cuts])
         # a peak that only the search for cuts has found
         point.value = max(point.value, max(cut.value for cut in cuts if not cut.hard))
-        values = np.array([cut.value for cut in cuts]) - np.where(hard, 0.0, point.value)
-        values = np.minimum(values, 0.0)
-        active = np.flatnonzero(~hard & (values >= -1e-4))
-        optimality, weights = shortest_combination(G[active])
+        model = CutModel(oracle, point, cuts, members=[] if model is None or model.point is not point else model.members)
+        optimality, weights = model.optimality()
         if point.value < target:
             return Descent(point, "target reached", iteration, optimality)
         if budget.spent:
             return Descent(point, "time limit", iteration, optimality)
-        if fresh:
+        if point.value < level - tolerance:
+            level, since = point.value, iteration
+        if iteration - since >= PATIENCE:
+            return Descent(point, "converged", iteration, optimality)
+        if F is None:
             M = oracle.metric(point)
             size = max(1.0, float(np.linalg.norm(point.theta, np.inf)))
             F = size * np.eye(n) if M is None else unit_steps(M)
-            fresh = False
-        scaled = _curvature(oracle, point, cuts, values, G @ F, hard, F, radius)
+        model.F = F
         step = None
         for shrink in SHRINK:
             # curvature far larger than the decrease may defeat the model of a large region
-            step = _step(values, G @ F, scaled, hard, active, weights, shrink * radius)
+            step = model.step(weights, shrink * radius)
             if step is not None and step.decrease > 1e-2 * tolerance:
                 radius *= shrink
                 break
@@ -92,8 +92,8 @@ def bundle(
             growing = ratio > 0.7 and length > 0.8 * radius
             # a small step that the region held back says nothing about convergence
             slow = slow + 1 if point.value - trial.value < tolerance and not growing else 0
-            earlier = [*earlier, [cut for cut, w in zip(cuts, step.multipliers, strict=True) if w > 1e-3]][-MEMORY:]
-            point, missed, fresh = trial, [], True
+            earlier = [*earlier, [cut for cut, w in zip(model.cuts, step.multipliers, strict=True) if w > 1e-3]][-MEMORY:]
+            point, missed, F = trial, [], None
             if accepted is not None:
                 accepted(point)
             if growing:
@@ -108,43 +108,3 @@ def bundle(
             if radius < 1e-10:
                 return Descent(point, "trust region vanished", iteration, optimality)
     return Descent(point, "iteration limit", max_iterations, optimality, radius)
-
-
-def _curvature(
-    oracle: Oracle,
-    point: Point,
-    cuts: list[Cut],
-    values: Array,
-    G: Array,
-    hard: NDArray[np.bool_],
-    F: Array,
-    radius: float,
-) -> Array | None:
-    """Hessians in unit steps of the cuts that a step may meet; zero for those far below."""
-    n = G.shape[1]
-    linear = quadratic_model(values, G, hard, 1e-9 * np.eye(n), radius)
-    depth = np.inf if linear is None else MET * linear.decrease
-    near = np.flatnonzero(~hard & (values >= -max(depth, 1e-4)))
-    found = oracle.hessians(point, [cuts[k] for k in near])
-    if found is None or not np.all(np.isfinite(found)):
-        return None
-    H = np.zeros((len(cuts), n, n))
-    H[near] = F.T @ found @ F
-    return H
-
-
-def _step(
-    values: Array,
-    G: Array,
-    H: Array | None,
-    hard: NDArray[np.bool_],
-    active: NDArray[np.intp],
-    weights: Array,
-    radius: float,
-) -> Subproblem | None:
-    if H is None:
-        size = float(np.max(np.linalg.norm(G[~hard], axis=1)))
-        return quadratic_model(values, G, hard, np.eye(G.shape[1]) * max(size, 1e-12) / radius, radius)
-    first = np.zeros(values.size)
-    first[active] = weights
-    return curved_step(values, G, H, hard, first, radius)

@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+import scipy.sparse
 from numpy.typing import NDArray
 
 from lpvhinf.checks import Array
 from lpvhinf.hinfstruct.loop import LoopFactory, augmented_gain
 from lpvhinf.hinfstruct.structures import ControllerStructure
 from lpvhinf.statespace.generalized import GeneralizedPlant
+
+#: Steps of first and of second differences, relative where a parameter is larger than one.
+SLOPE_STEP, BEND_STEP = 1e-5, 1e-4
 
 
 class ClosedLoops:
@@ -33,6 +37,9 @@ class ClosedLoops:
         self._scheduled = any(p is not None for p in points)
         self._slopes: dict[int, tuple[Array, NDArray[np.intp]]] = {}
         self._latest: dict[int, tuple[Array, Array]] = {}
+        self._sparse: dict[int, tuple[Array, scipy.sparse.csr_array]] = {}
+        self._coupled: dict[int, NDArray[np.intp]] = {}
+        self._second: dict[int, tuple[Array, Array]] = {}
 
     def gains(self, theta: Array) -> list[Array]:
         """The augmented gain of every plant."""
@@ -70,27 +77,90 @@ class ClosedLoops:
             self._latest[key] = theta.copy(), slopes
         return self._latest[key][1]
 
+    def inner_products(self, theta: Array, plant: int, M: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Inner products of the directions with matrices (..., n_K + n_u, n_K + n_y): (n_parameters, ...)."""
+        key = plant if self._scheduled else 0
+        dK = self.directions(theta, plant)
+        if key not in self._sparse or self._sparse[key][0] is not dK:
+            # most parameters move few entries
+            self._sparse[key] = dK, scipy.sparse.csr_array(dK.reshape(len(dK), -1))
+        flat = M.reshape(-1, M.shape[-2] * M.shape[-1])
+        return np.asarray(self._sparse[key][1] @ flat.T).reshape(-1, *M.shape[:-2])
+
     def _differences(self, theta: Array, plant: int, which: Iterable[int]) -> Array:
         p = self.points[plant]
         out = []
         for k in which:
             step = np.zeros_like(theta)
-            step[k] = 1e-5 * max(1.0, abs(theta[k]))
+            step[k] = SLOPE_STEP * max(1.0, abs(theta[k]))
             above = augmented_gain(*self.structure.realize(theta + step, p))
             out.append((above - augmented_gain(*self.structure.realize(theta - step, p))) / (2.0 * step[k]))
         return np.array(out)
 
     def bend(self, theta: Array, plant: int, G: Array) -> Array:
-        """Second derivative of the inner product of G with the augmented gain, by differences of the pullback."""
-        _, curved = self._constant(plant)
+        """Second derivative of the inner product of G with the augmented gain, by differences of `realize`.
+
+        Only the pairs of parameters with a mixed derivative are differenced, once for all functions at a point.
+        """
         H = np.zeros((theta.size, theta.size))
-        for k in curved:
-            step = np.zeros_like(theta)
-            step[k] = 1e-5 * max(1.0, abs(theta[k]))
-            above, below = self.pullback(theta + step, plant, G), self.pullback(theta - step, plant, G)
-            H[k] = (above - below) / (2.0 * step[k])
-        H[:, np.setdiff1d(np.arange(theta.size), curved)] = 0.0  # round-off of the differences
-        return np.asarray(0.5 * (H + H.T))
+        pairs = self._pairs(plant)
+        if not pairs.size:
+            return H
+        key = plant if self._scheduled else 0
+        if key not in self._second or not np.array_equal(self._second[key][0], theta):
+            self._second[key] = theta.copy(), self._mixed_differences(theta, plant, pairs)
+        values = np.tensordot(self._second[key][1], G, axes=2)
+        H[pairs[:, 0], pairs[:, 1]] = values
+        H[pairs[:, 1], pairs[:, 0]] = values
+        return H
+
+    def _pairs(self, plant: int) -> NDArray[np.intp]:
+        """Pairs i <= j of parameters with a second derivative that does not vanish everywhere, (n_pairs, 2).
+
+        By differences of the pullback at random parameters. As for `_constant` it only decides what is computed.
+        """
+        key = plant if self._scheduled else 0
+        if key not in self._coupled:
+            _, curved = self._constant(plant)
+            rng = np.random.default_rng(1)
+            n = self.structure.n_parameters
+            size = np.zeros((n, n))
+            for _ in range(2):
+                theta = rng.standard_normal(n)
+                G = rng.standard_normal(augmented_gain(*self.structure.realize(theta, self.points[plant])).shape)
+                with np.errstate(over="ignore", invalid="ignore"):
+                    for k in curved:
+                        step = np.zeros(n)
+                        step[k] = SLOPE_STEP
+                        change = self.pullback(theta + step, plant, G) - self.pullback(theta - step, plant, G)
+                        size[k] = np.maximum(size[k], np.abs(change) / (2.0 * SLOPE_STEP))
+            size = np.where(np.isfinite(size), size, np.inf)
+            size = np.maximum(size, size.T)
+            largest = float(np.max(size[np.isfinite(size)], initial=1e-300))
+            self._coupled[key] = np.argwhere(np.triu(size > 1e-8 * largest))
+        return self._coupled[key]
+
+    def _mixed_differences(self, theta: Array, plant: int, pairs: NDArray[np.intp]) -> Array:
+        """Second derivatives of the augmented gain for pairs of parameters, (n_pairs, n_K + n_u, n_K + n_y)."""
+        p = self.points[plant]
+        steps = BEND_STEP * np.maximum(1.0, np.abs(theta))
+
+        def gain(*moves: tuple[int, float]) -> Array:
+            moved = theta.copy()
+            for k, sign in moves:
+                moved[k] += sign * steps[k]
+            return augmented_gain(*self.structure.realize(moved, p))
+
+        middle = gain()
+        out = np.empty((len(pairs), *middle.shape))
+        for row, (i, j) in enumerate(pairs):
+            if i == j:
+                out[row] = (gain((i, 1.0)) + gain((i, -1.0)) - 2.0 * middle) / steps[i] ** 2
+            else:
+                same = gain((i, 1.0), (j, 1.0)) + gain((i, -1.0), (j, -1.0))
+                opposite = gain((i, 1.0), (j, -1.0)) + gain((i, -1.0), (j, 1.0))
+                out[row] = (same - opposite) / (4.0 * steps[i] * steps[j])
+        return out
 
     def pullback(self, theta: Array, plant: int, G: Array) -> Array:
         """Gradient in theta of a function with the gradient `G` in the augmented gain of a plant."""

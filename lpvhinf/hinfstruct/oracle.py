@@ -9,8 +9,10 @@ import numpy as np
 
 from lpvhinf.checks import Array
 from lpvhinf.hinfstruct.closed_loops import ClosedLoops
+from lpvhinf.hinfstruct.cluster import SMALLEST as SMALLEST
+from lpvhinf.hinfstruct.cluster import Cluster, hermitian_products
 from lpvhinf.hinfstruct.curvature import log_gain_hessian
-from lpvhinf.hinfstruct.gradient import PeakGain, directions, peak_gain
+from lpvhinf.hinfstruct.gradient import PeakGain, peak_gain
 from lpvhinf.hinfstruct.loop import ClosedLoop
 from lpvhinf.hinfstruct.metric import OFF_AXIS, SLOW, loop_metric
 from lpvhinf.hinfstruct.norm import NormResult, above_level, exact_norm, slicot_peak
@@ -21,12 +23,12 @@ from lpvhinf.hinfstruct.problem import Oracle as Oracle
 from lpvhinf.hinfstruct.problem import Point as Point
 from lpvhinf.hinfstruct.response import Response
 
-#: Norms below this count as zero (their logarithm must stay finite).
-SMALLEST = 1e-10
 #: Parameters beyond this count as infinite.
 LARGEST = 1e9
 #: Loops of up to so many states are cheaper to evaluate by the exact norm than by peaks.
 SMALL = 20
+#: Singular values of a cluster, at most.
+MOST = 8
 #: Frequencies that differ by less, relatively, are one.
 CLOSE = 1e-4
 
@@ -41,6 +43,7 @@ class Models:
     decisive: int = -1
     top: float = 0.0
     hessians: dict[tuple[int, float, bytes], Array] = field(default_factory=dict)
+    cuts: list[Cut] | None = None
 
     def response(self, i: int) -> Response:
         """The response of loop i, factorised when first asked for."""
@@ -214,39 +217,51 @@ class NormOracle:
         peak would step into it again and again.
         """
         models: Models = point.data
-        top = models.top
-        out: list[Cut] = []
+        if models.cuts is None:
+            models.cuts = self._peak_cuts(point) + self._poles_at_risk(point)
+        out = list(models.cuts)
         seen: dict[int, Array] = {}
-        for i, known in enumerate(models.peaks):
-            assert known is not None
-            if known.sigma[0] < self.fraction * top:
-                continue
-            extra = np.concatenate([self._hints[i], self._missed[i], known.omega])
-            peaks = find_peaks(models.response(i), extra=extra, fraction=0.0, floor=self.fraction * top)
-            seen[i] = peaks.omega
-            for omega in peaks.omega:
-                out += self._cuts_at(point, i, float(omega), self.cluster)
+        for i in range(len(models.loops)):
+            seen[i] = np.array([cut.label[1] for cut in out if not cut.hard and cut.label[0] == i])
         wanted = [(cut.label[0], float(cut.label[1])) for cut in earlier if not cut.hard]
         for other in missed:
             if other.data is not None and other.data.decisive >= 0:
                 i = other.data.decisive
                 wanted += [(i, float(omega)) for omega in other.data.peaks[i].omega[:3]]
         for i, omega in wanted:
-            if i not in seen or not np.any(np.isclose(seen[i], omega, rtol=CLOSE, atol=0.0)):
+            if not np.any(np.isclose(seen[i], omega, rtol=CLOSE, atol=0.0)):
                 out += self._cuts_at(point, i, omega, 0.02)
-                seen[i] = np.append(seen.get(i, np.zeros(0)), omega)
-        return out + self._poles_at_risk(point)
+                seen[i] = np.append(seen[i], omega)
+        return out
+
+    def _peak_cuts(self, point: Point) -> list[Cut]:
+        """Every peak above the fraction, at each the cluster of singular values."""
+        models: Models = point.data
+        floor = self.fraction * models.top
+        out: list[Cut] = []
+        for i, known in enumerate(models.peaks):
+            assert known is not None
+            if known.sigma[0] < floor:
+                continue
+            extra = np.concatenate([self._hints[i], self._missed[i], known.omega])
+            peaks = find_peaks(models.response(i), extra=extra, fraction=0.0, floor=floor)
+            for omega in peaks.omega:
+                out += self._cuts_at(point, i, float(omega), self.cluster)
+        return out
 
     def _cuts_at(self, point: Point, plant: int, omega: float, cluster: float) -> list[Cut]:
         loop = point.data.loops[plant]
-        gain: PeakGain = peak_gain(loop, omega, cluster)
-        out = []
-        for c in directions(gain.sigma, 0.03):
-            value = gain.value(c)
-            gradient = self.loops.pullback(point.theta, plant, gain.gradient(c))
-            gradient = gradient / (max(value, SMALLEST) + self.offset) + self._guard_gradient(point.theta)
-            out.append(Cut(self._value(point.theta, value), gradient, (plant, omega, np.trim_zeros(c, "b"))))
-        return out
+        gain: PeakGain = peak_gain(loop, omega, cluster, MOST)
+        slopes = self.loops.inner_products(point.theta, plant, hermitian_products(gain))
+        return Cluster(
+            plant=plant,
+            omega=omega,
+            sigma=gain.sigma,
+            slopes=0.5 * (slopes + slopes.conj().transpose(0, 2, 1)),
+            offset=self.offset,
+            height=0.5 * self.guard * float(np.log1p(point.theta @ point.theta)),
+            ascent=self._guard_gradient(point.theta),
+        ).cuts()
 
     def _poles_at_risk(self, point: Point) -> list[Cut]:
         """Poles near the axis: a step may use nine tenths of their distance."""

@@ -21,17 +21,25 @@ class Point:
     data: Any = None
 
 
+class Family(Protocol):
+    """A set of smooth functions below the maximum, too many to list."""
+
+    def best(self, d: Array) -> Cut:
+        """The one that is the largest, to first order, after the step d."""
+
+
 @dataclass(slots=True, eq=False)
 class Cut:
     """One smooth function: value and gradient at a point, and what it is.
 
-    Below the maximum; where `hard`, one that a step must keep at or below zero.
+    Below the maximum; where `hard`, one that a step must keep at or below zero. It may be one of a family.
     """
 
     value: float
     gradient: Array
     label: tuple[Any, ...]
     hard: bool = False
+    family: Family | None = None
 
 
 class Oracle(Protocol):

@@ -66,9 +66,9 @@ def weak_wolfe(
     return (None, None, False) if best is None else (*best, False)
 
 
-def first_hessian(oracle: Oracle, point: Point) -> Array:
-    """Inverse Hessian to begin with: that of the oracle's metric, else the identity."""
-    M = oracle.metric(point)
+def first_hessian(oracle: Oracle, point: Point, scaled: bool) -> Array:
+    """Inverse Hessian to begin with: if `scaled` that of the oracle's metric, else the identity."""
+    M = oracle.metric(point) if scaled else None
     if M is None or not np.all(np.isfinite(M)):
         return np.eye(point.theta.size)
     F = unit_steps(M)
@@ -84,13 +84,14 @@ def bfgs(
     tolerance: float = 1e-5,
     window: int = 15,
     target: float = -np.inf,
+    scaled: bool = True,
     accepted: Callable[[Point], None] | None = None,
 ) -> Descent:
     r"""Minimise a maximum of smooth functions from a point of finite value.
 
     BFGS with a weak Wolfe line search converges to nonsmooth minimisers in practice:
     the inverse Hessian learns the directions in which the maximum has a kink.
-    It begins with the oracle's metric. It ends below `target`, when the value fell by less than `tolerance` in
+    It begins with the oracle's metric or, if not `scaled`, with the parameters as they are. It ends below `target`, when the value fell by less than `tolerance` in
     `window` iterations, or when no descent is found along two steepest directions in turn.
 
     References
@@ -99,7 +100,7 @@ def bfgs(
     """
     point = start
     gradient = oracle.gradient(point)
-    H = first_hessian(oracle, point)
+    H = first_hessian(oracle, point, scaled)
     fresh = True
     values = [point.value]
     for iteration in range(max_iterations):
@@ -112,7 +113,7 @@ def bfgs(
         if not np.isfinite(slope) or slope >= -1e-14 * np.linalg.norm(direction) * np.linalg.norm(gradient):
             if fresh:
                 return Descent(point, "zero gradient", iteration)
-            H, fresh = first_hessian(oracle, point), True
+            H, fresh = first_hessian(oracle, point, scaled), True
             continue
         size = float(np.linalg.norm(direction))
         reach = max(1.0, float(np.linalg.norm(point.theta)))
@@ -124,7 +125,7 @@ def bfgs(
         if trial is None or new_gradient is None:
             if fresh:
                 return Descent(point, "no descent", iteration)
-            H, fresh = first_hessian(oracle, point), True
+            H, fresh = first_hessian(oracle, point, scaled), True
             continue
         step, change = trial.theta - point.theta, new_gradient - gradient
         product = float(step @ change)

@@ -159,6 +159,8 @@ def descend(task: Task, listen: Listener | None = None) -> Outcome:
             budget,
             max_iterations=task.max_iterations,
             tolerance=tolerance,
+            # a caller scales the parameters of his start by what he knows of them
+            scaled=task.theta is None or task.kick > 0.0,
             accepted=_heard(oracle, listen, "descend"),
         )
         theta, gamma, reason = run.point.theta, oracle.gamma(run.point), run.reason

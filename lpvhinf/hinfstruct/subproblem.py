@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -147,7 +148,7 @@ def convex_model(H: Array, G: Array, weights: Array) -> Array:
 
 
 def curved_step(
-    values: Array, G: Array, H: Array, hard: NDArray[np.bool_], weights: Array, radius: float
+    values: Array, G: Array, H: Array, bent: Sequence[int], hard: NDArray[np.bool_], weights: Array, radius: float
 ) -> Subproblem | None:
     r"""Decrease :math:`\max_i (f_i + g_i^T d + d^T H_i d / 2)` within :math:`|d_k| \le` radius.
 
@@ -159,23 +160,30 @@ def curved_step(
     ----------
     values, G, hard
         As in `quadratic_model`.
-    H : (m, n, n)
-        Hessians of the cuts.
+    H : (k, n, n)
+        Hessians of the cuts `bent`; those of the others count as zero.
+    bent : (k,) int
     weights : (m,)
         First guess of the multipliers.
     radius : float
     """
+    index = np.asarray(bent, dtype=int)
 
     def model(d: Array) -> Array:
-        return np.asarray(values + G @ d + 0.5 * np.einsum("i,kij,j->k", d, H, d))
+        out = values + G @ d
+        out[index] += 0.5 * ((H @ d) @ d)
+        return np.asarray(out)
 
     d = np.zeros(G.shape[1])
     height = float(np.max(values[~hard]))
     base = height
     for _ in range(ROUNDS):
-        slopes = G + H @ d
+        slopes = G.copy()
+        slopes[index] += H @ d
         active = weights > 1e-6
-        B = convex_model(np.tensordot(weights[active], H[active], axes=1), slopes[active], weights[active])
+        chosen = active[index]
+        lagrangian = np.tensordot(weights[index][chosen], H[chosen], axes=1)
+        B = convex_model(lagrangian, slopes[active], weights[active])
         now = model(d)
         below = np.minimum(np.where(hard, now, now - height), 0.0)
         found = quadratic_model(below, slopes, hard, B, radius, d)
