@@ -13,7 +13,7 @@ from lpvhinf.hinfstruct.problem import Budget, Cut, Oracle, Point
 from lpvhinf.hinfstruct.quasi_newton import Descent
 
 #: First radius of the trust region, in unit steps of the metric.
-FIRST_RADIUS = 0.3
+FIRST_RADIUS = 1.0
 #: Accepted steps for which cuts that decided are remembered.
 MEMORY = 3
 #: Iterations without a gain of the tolerance in all after which the polish ends.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import block_diag
 
 from lpvhinf.checks import Array, finite_array, read_only
 from lpvhinf.errors import DimensionError, DomainError
@@ -43,7 +42,7 @@ class BlockDiagonal:
     def realize(self, theta: Array, p: Array | None = None) -> Realization:
         """Block-diagonal (A, B, C, D)."""
         parts = [b.realize(t, p) for b, t in zip(self.blocks, np.split(theta, self._cuts), strict=True)]
-        A, B, C, D = (block_diag(*[part[k] for part in parts]) for k in range(4))
+        A, B, C, D = (_block_diagonal([part[k] for part in parts]) for k in range(4))
         return A, B, C, D
 
     def pullback(self, theta: Array, GA: Array, GB: Array, GC: Array, GD: Array, p: Array | None = None) -> Array:
@@ -154,3 +153,13 @@ class Constant:
     def initial(self, rng: np.random.Generator) -> Array:
         """Empty."""
         return np.zeros(0)
+
+
+def _block_diagonal(blocks: list[Array]) -> Array:
+    """Blocks on the diagonal; called for every parameter at every step, so without the checks of a library."""
+    out = np.zeros((sum(len(b) for b in blocks), sum(b.shape[1] for b in blocks)))
+    row = column = 0
+    for b in blocks:
+        out[row : row + b.shape[0], column : column + b.shape[1]] = b
+        row, column = row + b.shape[0], column + b.shape[1]
+    return out

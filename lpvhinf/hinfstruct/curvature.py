@@ -68,7 +68,9 @@ def log_gain_hessian(loop: ClosedLoop, omega: float, c: Complex, dK: Array, offs
     basis, gap = np.hstack(bases), np.concatenate(gaps)
     gap = np.where(np.abs(gap) > 1e-3 * value, gap, 1e-3 * value)
 
-    dKq, dKl = dK @ right, left @ dK
+    # real products: numpy would turn all of dK into complex numbers
+    dKq = (dK @ np.column_stack([right.real, right.imag])) @ np.array([1.0, 1j])
+    dKl = np.array([1.0, 1j]) @ (np.vstack([left.real, left.imag]) @ dK)
     Z = np.hstack([dKq @ L.T, (dKl @ Q).conj()]) @ basis.conj()
     hessian = ((Z.conj() / gap) @ Z.T).real
     mixed = dKl @ (N @ dKq.T)

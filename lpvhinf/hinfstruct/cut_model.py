@@ -102,7 +102,7 @@ class CutModel:
         d = self.F @ found.step
         after = self.values + self.G @ d
         low, deciding = -(1.0 - WORTH) * found.decrease, -(1.0 + WORTH) * found.decrease
-        bends = 0.5 * np.einsum("i,kij,j->k", found.step, self._H, found.step)
+        bends = 0.5 * (self._H @ found.step) @ found.step
         reach = after + max(0.0, float(np.max(bends, initial=0.0)))
         near = ~self.hard & (self.values >= -max(depth, ACTIVE))
         straight = np.setdiff1d(np.flatnonzero(near & (reach > deciding)), self._bent)

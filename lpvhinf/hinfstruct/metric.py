@@ -57,8 +57,8 @@ def loop_metric(loop: ClosedLoop, response: Response, omega: Array, dK: Array, s
     r, c = channel_sizes(np.sum(N.real**2 + N.imag**2, axis=0))
     N = N / (r[:, None] * c)
     dK = dK * (c[:, None] * r)
-    SL = np.einsum("kij,kil->jl", N.conj(), N).real
-    SR = np.einsum("kij,klj->il", N, N.conj()).real
+    rows, columns = N.reshape(-1, N.shape[2]), N.transpose(1, 0, 2).reshape(N.shape[1], -1)
+    SL, SR = (rows.conj().T @ rows).real, (columns @ columns.conj().T).real
     flat = dK.reshape(dK.shape[0], -1)
     moved = np.matmul(SL, dK) + np.matmul(dK, SR)
     return np.asarray(flat @ moved.reshape(flat.shape).T)

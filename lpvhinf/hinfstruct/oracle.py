@@ -27,6 +27,8 @@ from lpvhinf.hinfstruct.response import Response
 LARGEST = 1e9
 #: Loops of up to so many states are cheaper to evaluate by the exact norm than by peaks.
 SMALL = 20
+#: Plants above this part of the largest norm are tested by exact means, and are what a step must respect.
+NEAR = 0.9
 #: Singular values of a cluster, at most.
 MOST = 8
 #: Frequencies that differ by less, relatively, are one.
@@ -185,7 +187,7 @@ class NormOracle:
         known = [i for i, peaks in enumerate(models.peaks) if peaks is not None]
         heights = {i: models.height(i) for i in known}
         top = max(heights.values())
-        near = sorted((i for i in known if heights[i] >= 0.9 * top), key=lambda i: -heights[i])[:3]
+        near = sorted((i for i in known if heights[i] >= NEAR * top), key=lambda i: -heights[i])[:3]
         self._turn = (self._turn + 1) % len(self._order)
         if self._turn in known and self._turn not in near:
             near.append(self._turn)
@@ -306,7 +308,7 @@ class NormOracle:
         out = np.zeros((point.theta.size, point.theta.size))
         for i, peaks in enumerate(models.peaks):
             loop = models.loops[i]
-            if peaks is None or loop is None or models.height(i) < self.fraction * models.top:
+            if peaks is None or loop is None or models.height(i) < NEAR * models.top:
                 continue
             dK = self.loops.directions(point.theta, i)
             out += loop_metric(loop, models.response(i), peaks.omega, dK, self._scale)

@@ -168,31 +168,28 @@ def curved_step(
     radius : float
     """
     index = np.asarray(bent, dtype=int)
-
-    def model(d: Array) -> Array:
-        out = values + G @ d
-        out[index] += 0.5 * ((H @ d) @ d)
-        return np.asarray(out)
-
-    d = np.zeros(G.shape[1])
+    d, Hd = np.zeros(G.shape[1]), np.zeros((index.size, G.shape[1]))
+    now = values.copy()
     height = float(np.max(values[~hard]))
     base = height
     for _ in range(ROUNDS):
         slopes = G.copy()
-        slopes[index] += H @ d
+        slopes[index] += Hd
         active = weights > 1e-6
         chosen = active[index]
         lagrangian = np.tensordot(weights[index][chosen], H[chosen], axes=1)
         B = convex_model(lagrangian, slopes[active], weights[active])
-        now = model(d)
         below = np.minimum(np.where(hard, now, now - height), 0.0)
         found = quadratic_model(below, slopes, hard, B, radius, d)
         if found is None:
             break
         weights = found.multipliers
+        Hs = H @ found.step
+        rise, bend = slopes @ found.step, np.zeros(values.size)
+        bend[index] = 0.5 * (Hs @ found.step)
         t = 1.0
         while t > 1e-3:
-            trial = model(d + t * found.step)
+            trial = now + t * rise + t**2 * bend
             new = float(np.max(trial[~hard]))
             if new < height - 0.1 * t * found.decrease and np.all(trial[hard] <= 1e-9):
                 break
@@ -200,7 +197,7 @@ def curved_step(
         else:
             break
         gained = height - new
-        d, height = d + t * found.step, new
+        d, Hd, now, height = d + t * found.step, Hd + t * Hs, trial, new
         if gained < 0.05 * (base - height):
             break
     return Subproblem(d, weights, base - height) if height < base else None
