@@ -21,11 +21,10 @@ from lpvhinf.hinfstruct.continuum import hinfstruct_over_box
 from lpvhinf.progress import SILENT, Progress
 from lpvhinf.statespace.generalized import GeneralizedPlant
 
-# The bundle's trust region can shrink on kinks far from a minimum: the solver starts again from where it ended as
-# long as that pays.
-MAX_PASSES = 2
-PASS_GAIN = 0.005
-DESCENT_TOLERANCE = 1e-3
+# The polish follows kinks far better than BFGS, which only leads it to a good region.
+DESCENT_TOLERANCE = 0.05
+# A conventional design that an observer design begins with: positions, and relative decrease that is worth a step.
+WARM_POSITIONS, WARM_TOLERANCE = 6, 0.01
 # Positions that the solver sees at once, unless more are asked for; and climbs of each search for a worse one.
 MAX_ACTIVE = 15
 N_REFINE = 3
@@ -71,7 +70,7 @@ def codesign(
         Design positions; default the corners of P and an even spread, `n_positions` in all.
     warm_start : Design or (n_theta,), optional
         A conventional design gives K_RB to start an observer design from; one of the same architecture, or
-        its parameters, are the start itself. Without it the conventional design is made first.
+        its parameters, are the start itself. Without it a rough conventional design is made first.
     rigid_start : (n_parameters of K_RB,), optional
         Parameters of K_RB that an observer design starts from, in place of a conventional design.
     starts : int
@@ -128,38 +127,30 @@ def codesign(
 
     if architecture == "output-observer" and warm_start is None and rigid_start is None:
         warm_start = codesign(
-            decoupled, "rigid-body", spec, positions=active, exchange_rounds=0, n_search=1, seed=seed,
-            max_iterations=max_iterations, tolerance=tolerance, time_limit=time_limit, progress=progress,
+            decoupled, "rigid-body", spec, positions=active[:WARM_POSITIONS], starts=1, exchange_rounds=0, n_search=1,
+            seed=seed, max_iterations=max_iterations, tolerance=max(tolerance, WARM_TOLERANCE),
+            time_limit=time_limit, progress=progress,
         )  # fmt: skip
     begin = _initial(assembly, active, warm_start, rigid_start, starts)
     progress.stage(f"{architecture}: {len(active)} positions, {assembly.structure.n_parameters} parameters")
-    passes = [MAX_PASSES]
 
     def solve(plants: Sequence[GeneralizedPlant], points: Array, initial: Sequence[Array] | None) -> HinfstructResult:
-        """Solve at the design positions; several passes in the first round only."""
-        best: HinfstructResult | None = None
-        begins = list(begin if initial is None else initial)
-        for _ in range(passes.pop() if passes else 1):
-            result = hinfstruct(
-                plants,
-                assembly.structure,
-                initial=begins,
-                starts=0,
-                seed=seed,
-                jobs=jobs,
-                max_iterations=max_iterations,
-                tolerance=tolerance,
-                descent_tolerance=DESCENT_TOLERANCE,
-                time_limit=time_limit,
-                progress=progress,
-                checkpoint=checkpoint,
-                bound=False,  # of every position, for every pass: many times the work of the design
-            )
-            if best is not None and result.gamma > (1.0 - PASS_GAIN) * best.gamma:
-                return min(best, result, key=lambda r: r.gamma)
-            best, begins = result, [np.asarray(result.parameters)]
-        assert best is not None
-        return best
+        """Solve at the design positions."""
+        return hinfstruct(
+            plants,
+            assembly.structure,
+            initial=list(begin if initial is None else initial),
+            starts=0,
+            seed=seed,
+            jobs=jobs,
+            max_iterations=max_iterations,
+            tolerance=tolerance,
+            descent_tolerance=DESCENT_TOLERANCE,
+            time_limit=time_limit,
+            progress=progress,
+            checkpoint=checkpoint,
+            bound=False,  # of every position: many times the work of the design
+        )
 
     found = hinfstruct_over_box(
         plant_family(assembly),

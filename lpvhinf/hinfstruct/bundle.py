@@ -58,7 +58,9 @@ def bundle(
         cuts = oracle.cuts(point, missed, [cut for step in earlier for cut in step])
         # a peak that only the search for cuts has found
         point.value = max(point.value, max(cut.value for cut in cuts if not cut.hard))
-        model = CutModel(oracle, point, cuts, members=[] if model is None or model.point is not point else model.members)
+        model = CutModel(
+            oracle, point, cuts, members=[] if model is None or model.point is not point else model.members
+        )
         optimality, weights = model.optimality()
         if point.value < target:
             return Descent(point, "target reached", iteration, optimality)
@@ -92,7 +94,9 @@ def bundle(
             growing = ratio > 0.7 and length > 0.8 * radius
             # a small step that the region held back says nothing about convergence
             slow = slow + 1 if point.value - trial.value < tolerance and not growing else 0
-            earlier = [*earlier, [cut for cut, w in zip(model.cuts, step.multipliers, strict=True) if w > 1e-3]][-MEMORY:]
+            earlier = [*earlier, [cut for cut, w in zip(model.cuts, step.multipliers, strict=True) if w > 1e-3]][
+                -MEMORY:
+            ]
             point, missed, F = trial, [], None
             if accepted is not None:
                 accepted(point)

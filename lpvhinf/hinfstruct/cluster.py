@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from lpvhinf.checks import Array
+from lpvhinf.hinfstruct.closed_loops import ClosedLoops
 from lpvhinf.hinfstruct.gradient import PeakGain
 from lpvhinf.hinfstruct.problem import Cut
 from lpvhinf.hinfstruct.response import Complex
@@ -26,29 +29,28 @@ class Cluster:
 
     Attributes
     ----------
-    plant : int
-    omega : float, rad/s
     sigma : (r,) singular values
     slopes : (n, r, r) complex, Hermitian, derivatives in the parameters
     offset, height : float
         The function is log(gain + offset) + height.
     ascent : (n,)
         Gradient of what `height` stands for.
+    label : callable
+        c -> label of its cut.
     """
 
-    plant: int
-    omega: float
     sigma: Array
     slopes: Complex
     offset: float
     height: float
     ascent: Array
+    label: Callable[[Complex], tuple[Any, ...]]
 
     def cut(self, c: Complex) -> Cut:
         """The smooth function of the unit vector c."""
         gain = max(float(np.sum(np.abs(c) ** 2 * self.sigma)), SMALLEST) + self.offset
         slope = ((self.slopes @ c) @ c.conj()).real
-        label = (self.plant, self.omega, np.trim_zeros(c, "b"))
+        label = self.label(np.trim_zeros(c, "b"))
         family = self if self.sigma.size > 1 else None
         return Cut(float(np.log(gain)) + self.height, slope / gain + self.ascent, label, family=family)
 
@@ -62,9 +64,25 @@ class Cluster:
         return self.cut(np.linalg.eigh(0.5 * (S + S.conj().T))[1][:, -1])
 
 
-def hermitian_products(gain: PeakGain) -> Complex:
-    """Matrices whose inner products with a change of the augmented gain are the entries of the change of the gain.
-
-    Entry (i, j) of the (r, r, n_K + n_u, n_K + n_y) result is the outer product of left vector i and right vector j.
-    """
-    return np.asarray(np.einsum("im,qj->ijmq", gain.left, gain.right))
+def cluster_at(
+    gain: PeakGain,
+    loops: ClosedLoops,
+    theta: Array,
+    plant: int,
+    *,
+    label: Callable[[Complex], tuple[Any, ...]],
+    offset: float = 0.0,
+    height: float = 0.0,
+    ascent: Array | None = None,
+) -> Cluster:
+    """The cluster of the singular values at a frequency of a plant's loop."""
+    products = np.einsum("im,qj->ijmq", gain.left, gain.right)
+    slopes = loops.inner_products(theta, plant, products)
+    return Cluster(
+        sigma=gain.sigma,
+        slopes=0.5 * (slopes + slopes.conj().transpose(0, 2, 1)),
+        offset=offset,
+        height=height,
+        ascent=np.zeros(theta.size) if ascent is None else ascent,
+        label=label,
+    )

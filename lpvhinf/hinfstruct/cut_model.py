@@ -121,5 +121,5 @@ class CutModel:
 
     def _family_top(self, member: Cut, after: Array) -> float:
         """The highest value after the step of the cuts of the same family, with a margin for round-off."""
-        same = [after[k] for k, cut in enumerate(self.cuts) if cut.family is member.family]
+        same = [float(after[k]) for k, cut in enumerate(self.cuts) if cut.family is member.family]
         return max(same) + 1e-3 * abs(max(same)) + 1e-12

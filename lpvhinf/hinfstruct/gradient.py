@@ -71,20 +71,3 @@ def _near_maximal(T: Complex, cluster: float, most: int) -> tuple[Complex, Array
     U, sigma, Vh = np.linalg.svd(T, full_matrices=False)
     r = int(min(np.sum(sigma >= (1.0 - cluster) * sigma[0]), most))
     return U[:, :r], sigma, Vh[:r].conj().T, r
-
-
-def directions(sigma: Array, tight: float) -> list[Complex]:
-    """Unit vectors over a cluster of singular values that describe it by cuts.
-
-    Each singular vector alone and, for pairs closer than the fraction `tight`, their equal
-    mixtures (e_i +- e_j) / sqrt 2 and (e_i +- i e_j) / sqrt 2: the largest eigenvalue of a Hermitian
-    matrix is above all these, and the mixtures see its off-diagonal entries.
-    """
-    r = sigma.size
-    eye = np.eye(r, dtype=complex)
-    out = [eye[i] for i in range(r)]
-    for i in range(r):
-        for j in range(i + 1, r):
-            if sigma[j] >= (1.0 - tight) * sigma[0]:
-                out += [(eye[i] + phase * eye[j]) / np.sqrt(2.0) for phase in (1.0, -1.0, 1j, -1j)]
-    return out

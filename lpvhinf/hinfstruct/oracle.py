@@ -10,9 +10,9 @@ import numpy as np
 from lpvhinf.checks import Array
 from lpvhinf.hinfstruct.closed_loops import ClosedLoops
 from lpvhinf.hinfstruct.cluster import SMALLEST as SMALLEST
-from lpvhinf.hinfstruct.cluster import Cluster, hermitian_products
+from lpvhinf.hinfstruct.cluster import cluster_at
 from lpvhinf.hinfstruct.curvature import log_gain_hessian
-from lpvhinf.hinfstruct.gradient import PeakGain, peak_gain
+from lpvhinf.hinfstruct.gradient import peak_gain
 from lpvhinf.hinfstruct.loop import ClosedLoop
 from lpvhinf.hinfstruct.metric import OFF_AXIS, SLOW, loop_metric
 from lpvhinf.hinfstruct.norm import NormResult, above_level, exact_norm, slicot_peak
@@ -252,14 +252,12 @@ class NormOracle:
         return out
 
     def _cuts_at(self, point: Point, plant: int, omega: float, cluster: float) -> list[Cut]:
-        loop = point.data.loops[plant]
-        gain: PeakGain = peak_gain(loop, omega, cluster, MOST)
-        slopes = self.loops.inner_products(point.theta, plant, hermitian_products(gain))
-        return Cluster(
-            plant=plant,
-            omega=omega,
-            sigma=gain.sigma,
-            slopes=0.5 * (slopes + slopes.conj().transpose(0, 2, 1)),
+        return cluster_at(
+            peak_gain(point.data.loops[plant], omega, cluster, MOST),
+            self.loops,
+            point.theta,
+            plant,
+            label=lambda c: (plant, omega, c),
             offset=self.offset,
             height=0.5 * self.guard * float(np.log1p(point.theta @ point.theta)),
             ascent=self._guard_gradient(point.theta),

@@ -91,8 +91,9 @@ def bfgs(
 
     BFGS with a weak Wolfe line search converges to nonsmooth minimisers in practice:
     the inverse Hessian learns the directions in which the maximum has a kink.
-    It begins with the oracle's metric or, if not `scaled`, with the parameters as they are. It ends below `target`, when the value fell by less than `tolerance` in
-    `window` iterations, or when no descent is found along two steepest directions in turn.
+    It begins with the oracle's metric or, if not `scaled`, with the parameters as they are. It ends below
+    `target`, when the value fell by less than `tolerance` in `window` iterations, or when no descent is found along
+    two steepest directions in turn.
 
     References
     ----------

@@ -8,7 +8,6 @@ import pytest
 from lpvhinf.checks import Array
 from lpvhinf.hinfstruct import BlockDiagonal, ControllerStructure, DiagonalGain, FixedOrder, Scaled, StaticGain
 from lpvhinf.hinfstruct.closed_loops import ClosedLoops
-from lpvhinf.hinfstruct.gradient import directions
 from lpvhinf.hinfstruct.loop import LoopFactory, augmented_gain
 from lpvhinf.hinfstruct.oracle import NormOracle
 from lpvhinf.hinfstruct.problem import Budget
@@ -97,10 +96,24 @@ def test_a_defective_pole_gives_a_finite_gradient() -> None:
     assert np.all(np.isfinite(oracle.gradient(oracle.evaluate(np.zeros(2)))))
 
 
-def test_directions_describe_a_cluster() -> None:
-    assert len(directions(np.array([1.0]), 0.03)) == 1
-    assert len(directions(np.array([1.0, 0.99]), 0.03)) == 6
-    assert len(directions(np.array([1.0, 0.9]), 0.03)) == 2
+def test_a_cluster_predicts_the_largest_singular_value_where_several_coincide() -> None:
+    # four equal axes: a fourfold singular value, which a coupled change of the controller splits
+    one = random_plant(4)
+    parts = (one.A, one.B1, one.B2, one.C1, one.C2, one.D11, one.D12, one.D21)
+    axes = GeneralizedPlant(*[np.kron(np.eye(4), M) for M in parts])
+    loops = ClosedLoops([axes], StaticGain(8, 8), (None,))
+    oracle = NormOracle(loops, Budget())
+    theta = np.zeros(64)
+    point = oracle.evaluate(theta)
+    top = max((cut for cut in oracle.cuts(point) if not cut.hard), key=lambda cut: cut.value)
+    assert top.family is not None
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        d = 1e-5 * rng.standard_normal(64)
+        member = top.family.best(d)
+        change = oracle.evaluate(theta + d).value - point.value
+        assert member.value + member.gradient @ d - point.value == pytest.approx(change, abs=1e-2 * abs(change))
+        assert top.gradient @ d < 0.9 * change
 
 
 def test_peaks_of_every_plant_become_cuts() -> None:

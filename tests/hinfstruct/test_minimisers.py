@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
+import cvxpy as cp
 import numpy as np
 import pytest
 
@@ -58,6 +60,63 @@ def test_bundle_reaches_the_optimality_condition_of_a_convex_maximum(seed: int) 
     assert run.iterations < 60
 
 
+class LargestEigenvalue:
+    """lambda_max(A_0 + sum_k x_k A_k) + |x|^2 / 20: one cut, and the family of all others."""
+
+    def __init__(self, seed: int, n: int, size: int) -> None:
+        rng = np.random.default_rng(seed)
+        roots = rng.standard_normal((n + 1, size, size))
+        self.A = roots + roots.transpose(0, 2, 1)
+
+    def value(self, x: Array) -> tuple[float, Array]:
+        values, vectors = np.linalg.eigh(self.A[0] + np.tensordot(x, self.A[1:], axes=1))
+        return float(values[-1]) + 0.05 * float(x @ x), vectors[:, -1]
+
+    def cut(self, x: Array, v: Array, family: Eigenvectors | None = None) -> Cut:
+        moved = np.einsum("i,kij,j->k", v, self.A[1:], v)
+        family = Eigenvectors(self, x) if family is None else family
+        return Cut(float(v @ self.A[0] @ v + x @ moved + 0.05 * x @ x), moved + 0.1 * x, (0,), family=family)
+
+    def evaluate(self, theta: Array, cutoff: float = np.inf) -> Point:
+        return Point(theta, self.value(theta)[0])
+
+    def confirm(self, point: Point) -> Point:
+        return point
+
+    def gradient(self, point: Point) -> Array:
+        return self.cut(point.theta, self.value(point.theta)[1]).gradient
+
+    def cuts(self, point: Point, missed: Sequence[Point] = (), earlier: Sequence[Cut] = ()) -> list[Cut]:
+        return [self.cut(point.theta, self.value(point.theta)[1])]
+
+    def hessians(self, point: Point, cuts: Sequence[Cut]) -> Array | None:
+        return np.array([0.1 * np.eye(point.theta.size)] * len(cuts))
+
+    def metric(self, point: Point) -> Array | None:
+        return np.eye(point.theta.size)
+
+
+@dataclass(frozen=True)
+class Eigenvectors:
+    oracle: LargestEigenvalue
+    x: Array
+
+    def best(self, d: Array) -> Cut:
+        return self.oracle.cut(self.x, self.oracle.value(self.x + d)[1], self)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_bundle_minimises_a_multiple_largest_eigenvalue(seed: int) -> None:
+    oracle = LargestEigenvalue(seed, 8, 6)
+    run = bundle(oracle, oracle.evaluate(np.ones(8)), Budget(), tolerance=1e-8)
+    x = cp.Variable(8)
+    S = oracle.A[0] + sum(x[k] * oracle.A[k + 1] for k in range(8))
+    best = cp.Problem(cp.Minimize(cp.lambda_max(S) + 0.05 * cp.sum_squares(x))).solve(solver=cp.CLARABEL)
+    assert run.point.value == pytest.approx(best, abs=1e-5)
+    values = np.linalg.eigvalsh(oracle.A[0] + np.tensordot(run.point.theta, oracle.A[1:], axes=1))
+    assert values[-2] == pytest.approx(values[-1], abs=1e-3)
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_bfgs_comes_close_to_the_same_minimum(seed: int) -> None:
     oracle = MaxOfQuadratics(seed, 6, 5)
@@ -102,14 +161,14 @@ def test_quadratic_model_keeps_hard_rows() -> None:
 def test_curved_step_follows_a_curved_kink() -> None:
     # max(|x|^2 / 2 + x1, |x|^2 / 2 - x1) - x0 on a box: the minimum is (1, 0), where both are -1/2
     G, H = np.array([[-1.0, 1.0], [-1.0, -1.0]]), np.array([np.eye(2), np.eye(2)])
-    step = curved_step(np.zeros(2), G, H, np.array([False, False]), np.array([0.5, 0.5]), 2.0)
+    step = curved_step(np.zeros(2), G, H, [0, 1], np.array([False, False]), np.array([0.5, 0.5]), 2.0)
     assert step is not None
     np.testing.assert_allclose(step.step, [1.0, 0.0], atol=1e-6)
     assert step.decrease == pytest.approx(0.5)
 
 
 def test_curved_step_takes_negative_curvature_to_the_edge() -> None:
-    step = curved_step(np.zeros(1), np.array([[0.1]]), np.array([[[-1.0]]]), np.array([False]), np.ones(1), 0.5)
+    step = curved_step(np.zeros(1), np.array([[0.1]]), np.array([[[-1.0]]]), [0], np.array([False]), np.ones(1), 0.5)
     assert step is not None
     np.testing.assert_allclose(step.step, [-0.5], atol=1e-6)
 

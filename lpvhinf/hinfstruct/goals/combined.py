@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from lpvhinf.checks import Array
 from lpvhinf.hinfstruct.goals.goal_oracle import GoalOracle
-from lpvhinf.hinfstruct.problem import Cut, Oracle, Point
+from lpvhinf.hinfstruct.problem import Cut, Family, Oracle, Point
 
 #: Constraints whose level is below this are no cuts where they are hard.
 FAR = -1.0
@@ -21,6 +21,31 @@ class Parts:
 
     objective: Point | None
     constraint: Point | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _RenamedFamily:
+    """The cuts of a family as those of one part."""
+
+    family: Family
+    rename: Callable[[Cut], Cut]
+
+    def best(self, d: Array) -> Cut:
+        """The one that is the largest, to first order, after the step d."""
+        cut = self.rename(self.family.best(d))
+        cut.family = self
+        return cut
+
+
+def _renamed(cuts: Sequence[Cut], rename: Callable[[Cut], Cut]) -> list[Cut]:
+    families: dict[int, _RenamedFamily] = {}
+    out = []
+    for cut in cuts:
+        new = rename(cut)
+        if cut.family is not None:
+            new.family = families.setdefault(id(cut.family), _RenamedFamily(cut.family, rename))
+        out.append(new)
+    return out
 
 
 class CombinedOracle:
@@ -107,14 +132,15 @@ class CombinedOracle:
             before[1],
             lowest,
         )
-        out = [
-            Cut(cut.value - (0.0 if cut.hard else self.level), cut.gradient, ("objective", cut), cut.hard)
-            for cut in objective
-        ]
-        return out + [
-            Cut(min(cut.value, 0.0) if self.hard else cut.value, cut.gradient, ("constraint", cut), self.hard)
-            for cut in constraint
-        ]
+        return _renamed(objective, self._of_objective) + _renamed(constraint, self._of_constraint)
+
+    def _of_objective(self, cut: Cut) -> Cut:
+        value = cut.value - (0.0 if cut.hard else self.level)
+        return Cut(value, cut.gradient, ("objective", cut), cut.hard)
+
+    def _of_constraint(self, cut: Cut) -> Cut:
+        value = min(cut.value, 0.0) if self.hard else cut.value
+        return Cut(value, cut.gradient, ("constraint", cut), self.hard)
 
     def hessians(self, point: Point, cuts: Sequence[Cut]) -> Array | None:
         """Hessians by both parts; None if one has none."""

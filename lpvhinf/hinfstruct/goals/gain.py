@@ -17,7 +17,7 @@ from lpvhinf.hinfstruct.goals.state import (
     RawCut,
     channel_loop,
 )
-from lpvhinf.hinfstruct.gradient import directions, peak_gain
+from lpvhinf.hinfstruct.gradient import peak_gain
 from lpvhinf.hinfstruct.loop import ClosedLoop
 from lpvhinf.hinfstruct.norm import TOLERANCE, above_level
 from lpvhinf.hinfstruct.peaks import Peaks, find_peaks
@@ -27,6 +27,8 @@ from lpvhinf.hinfstruct.response import Response, largest_sigma
 SMALLEST = 1e-12
 #: Singular values within this share of the largest at a peak become cuts.
 CLUSTER = 0.15
+#: Singular values of a cluster, at most.
+MOST = 8
 #: Frequencies of a band that are looked at besides those placed by the poles.
 POINTS = 24
 
@@ -89,23 +91,19 @@ class GainEvaluator:
         loop, T = self._channel(state)
         peaks = self._peaks(T, 0.0, self.at_most * float(np.exp(lowest)))
         out = [self._at(loop, float(omega), CLUSTER) for omega in peaks.omega]
-        return sorted((cut for cuts in out for cut in cuts), key=lambda cut: -cut.level)
+        return sorted(out, key=lambda cut: -cut.level)
 
     def again(self, state: LoopState, key: tuple[Any, ...]) -> list[RawCut]:
         """The gain at the same frequency."""
-        return self._at(self._channel(state)[0], float(key[0]), 0.02)
+        return [self._at(self._channel(state)[0], float(key[0]), 0.02)]
 
     def keys(self, measure: Measure) -> list[tuple[Any, ...]]:
         """The highest peaks."""
         return [(float(omega),) for omega in measure.data.omega[:3]]
 
-    def _at(self, loop: ClosedLoop, omega: float, cluster: float) -> list[RawCut]:
-        gain = peak_gain(loop, omega, cluster)
-        out = []
-        for c in directions(gain.sigma, 0.03):
-            value = max(gain.value(c), SMALLEST * self.at_most)
-            out.append(RawCut(self._level(value), gain.gradient(c) / value, (omega, np.trim_zeros(c, "b"))))
-        return out
+    def _at(self, loop: ClosedLoop, omega: float, cluster: float) -> RawCut:
+        gain = peak_gain(loop, omega, cluster, MOST)
+        return RawCut(self._level(float(gain.sigma[0])), None, (omega,), peak=gain, height=-float(np.log(self.at_most)))
 
     def curvature(self, state: LoopState, key: tuple[Any, ...], dK: Array) -> tuple[Array, Array]:
         """Hessian of the logarithm of a peak, its frequency moving along."""

@@ -10,6 +10,7 @@ import numpy as np
 from lpvhinf.checks import Array
 from lpvhinf.errors import AssumptionError, DomainError
 from lpvhinf.hinfstruct.closed_loops import ClosedLoops
+from lpvhinf.hinfstruct.cluster import cluster_at
 from lpvhinf.hinfstruct.goals.descriptions import ChannelNorm, ClosedLoopPoles, FrequencyBand, Goal, H2Norm
 from lpvhinf.hinfstruct.goals.gain import GainEvaluator
 from lpvhinf.hinfstruct.goals.h2 import ZERO, H2Evaluator
@@ -162,11 +163,22 @@ class GoalOracle:
         task, measure = self._tasks[k], levels.measures[k]
         assert measure is not None
         raw = task.evaluator.cuts(levels.states[task.plant], measure, lowest - self.margin)
-        return [self._cut(point, k, part) for part in raw]
+        return [cut for part in raw for cut in self._cuts_of(point, k, part)]
 
-    def _cut(self, point: Point, k: int, part: RawCut) -> Cut:
-        gradient = self.loops.pullback(point.theta, self._tasks[k].plant, part.gradient)
-        return Cut(part.level + self.margin, gradient, (k, part.key))
+    def _cuts_of(self, point: Point, k: int, part: RawCut) -> list[Cut]:
+        plant = self._tasks[k].plant
+        if part.peak is not None:
+            return cluster_at(
+                part.peak,
+                self.loops,
+                point.theta,
+                plant,
+                label=lambda c: (k, (*part.key, c)),
+                height=part.height + self.margin,
+            ).cuts()
+        assert part.gradient is not None
+        gradient = self.loops.pullback(point.theta, plant, part.gradient)
+        return [Cut(part.level + self.margin, gradient, (k, part.key))]
 
     def cuts(
         self,
@@ -193,7 +205,7 @@ class GoalOracle:
                 continue
             for part in self._tasks[k].evaluator.again(levels.states[self._tasks[k].plant], key):
                 if (k, _rough(part.key)) not in present:
-                    out.append(self._cut(point, k, part))
+                    out += self._cuts_of(point, k, part)
             present |= {(cut.label[0], _rough(cut.label[1])) for cut in out}
         return out
 

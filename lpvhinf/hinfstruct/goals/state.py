@@ -9,6 +9,7 @@ import numpy as np
 import scipy.linalg
 
 from lpvhinf.checks import Array
+from lpvhinf.hinfstruct.gradient import PeakGain
 from lpvhinf.hinfstruct.loop import ClosedLoop
 from lpvhinf.hinfstruct.response import Complex, Response
 
@@ -94,11 +95,17 @@ class Measure:
 
 @dataclass(slots=True, eq=False)
 class RawCut:
-    """One smooth part of a goal: its level, its gradient in the augmented gain, and a key to find it again."""
+    """One smooth part of a goal: its level, its gradient in the augmented gain, and a key to find it again.
+
+    A part with a `peak` stands for the cluster of singular values there; its key is the frequency, and the level is
+    the logarithm of the gain plus `height`.
+    """
 
     level: float
-    gradient: Array
+    gradient: Array | None
     key: tuple[Any, ...]
+    peak: PeakGain | None = None
+    height: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
