@@ -25,6 +25,8 @@ from lpvhinf.statespace.generalized import GeneralizedPlant
 DESCENT_TOLERANCE = 0.05
 # A conventional design that an observer design begins with: positions, and relative decrease that is worth a step.
 WARM_POSITIONS, WARM_TOLERANCE = 6, 0.01
+# Iterations of the solver in the first round of an exchange and in the others, and the gain that is worth a round.
+FIRST_ITERATIONS, ROUND_ITERATIONS, ROUND_GAIN = 20, 10, 0.005
 # Positions that the solver sees at once, unless more are asked for; and climbs of each search for a worse one.
 MAX_ACTIVE = 15
 N_REFINE = 3
@@ -42,7 +44,7 @@ def codesign(
     warm_start: Design | ArrayLike | None = None,
     rigid_start: ArrayLike | None = None,
     starts: int = 2,
-    exchange_rounds: int = 2,
+    exchange_rounds: int = 12,
     exchange_tolerance: float = 0.01,
     n_search: int = 128,
     max_iterations: int = 150,
@@ -134,18 +136,22 @@ def codesign(
     begin = _initial(assembly, active, warm_start, rigid_start, starts)
     progress.stage(f"{architecture}: {len(active)} positions, {assembly.structure.n_parameters} parameters")
 
-    def solve(plants: Sequence[GeneralizedPlant], points: Array, initial: Sequence[Array] | None) -> HinfstructResult:
-        """Solve at the design positions."""
+    def at_positions(
+        plants: Sequence[GeneralizedPlant], points: Array, initial: Sequence[Array] | None
+    ) -> HinfstructResult:
+        fresh = initial is None or initial is begin
+        most = FIRST_ITERATIONS if fresh else ROUND_ITERATIONS
         return hinfstruct(
             plants,
             assembly.structure,
-            initial=list(begin if initial is None else initial),
+            initial=begin if initial is None else list(initial),
             starts=0,
             seed=seed,
             jobs=jobs,
             max_iterations=max_iterations,
+            polish_iterations=min(most, max_iterations) if exchange_rounds else None,
             tolerance=tolerance,
-            descent_tolerance=DESCENT_TOLERANCE,
+            descent_tolerance=DESCENT_TOLERANCE if fresh else None,
             time_limit=time_limit,
             progress=progress,
             checkpoint=checkpoint,
@@ -155,11 +161,12 @@ def codesign(
     found = hinfstruct_over_box(
         plant_family(assembly),
         assembly.structure,
-        solve,
+        at_positions,
         positions=active,
         max_active=MAX_ACTIVE,
         max_rounds=exchange_rounds + 1,
         tolerance=exchange_tolerance,
+        gain=ROUND_GAIN,
         n_search=n_search,
         n_refine=N_REFINE,
         seed=seed,

@@ -1,4 +1,4 @@
-"""Starts of a design: rules of thumb for K_RB; for an observer Riccati and damping gains, screened by exact norms."""
+"""Starts of a design: rules of thumb for K_RB; for an observer Riccati and damping gains, screened by their norms."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import numpy as np
 
 from lpvhinf.checks import Array
 from lpvhinf.codesign.assembly import Assembly
-from lpvhinf.codesign.positions import norms_at
+from lpvhinf.hinfstruct.closed_loops import ClosedLoops
+from lpvhinf.hinfstruct.oracle import NormOracle
+from lpvhinf.hinfstruct.problem import Budget
 
 # From gentle to strong: a larger damping gain spills over into the discarded modes.
 DAMPING = (0.05, 0.1, 0.2, 0.4, 0.8)
@@ -29,6 +31,8 @@ def observer_starts(assembly: Assembly, points: Array, rigid: Array, n: int) -> 
     """
     few = points[np.linspace(0, len(points) - 1, min(JUDGES, len(points))).astype(int)]
     tries = [assembly.start(points, rigid=rigid, xi=xi, noise_ratio=ratio) for xi in DAMPING for ratio in NOISE_RATIOS]
-    scores = np.log([float(np.max(norms_at(assembly, theta, few))) for theta in tries])
+    plants = assembly.generalized_plants(few)
+    oracle = NormOracle(ClosedLoops(plants, assembly.structure, (None,) * len(plants)), Budget())
+    scores = np.log([oracle.gamma(oracle.evaluate(theta)) for theta in tries])
     rounded = np.where(np.isfinite(scores), np.round((scores - np.min(scores)) / SAME), np.inf)
     return [tries[i] for i in np.argsort(rounded, kind="stable")[: max(1, n)]]

@@ -152,6 +152,7 @@ def hinfstruct_over_box(
     max_active: int = 15,
     max_rounds: int = 10,
     tolerance: float = 0.01,
+    gain: float | None = None,
     n_search: int = 128,
     n_refine: int = 5,
     seed: int = 0,
@@ -174,6 +175,9 @@ def hinfstruct_over_box(
     controller : ControllerStructure
     solve : callable (plants, points, initial) -> HinfstructResult
         Synthesis on the active set. `initial` is None where the solver shall use its own starts.
+    gain : float, optional
+        Where `solve` is cut short: rounds go on, too, while one lowers the worst value by more than this, relatively.
+        Short rounds keep the worst positions where they are; long ones leave the active set behind.
     positions : (N, n_p), optional
         First active set; default centre, corners and a spread, `n_positions` in all.
     n_positions, max_active, max_rounds : int
@@ -235,13 +239,15 @@ def hinfstruct_over_box(
         rounds.append(Round(positions=points, result=result, worst=worst))
         new = worst.candidates[worst.gammas > (1.0 + tolerance) * result.gamma][:MOST_ADDED]
         seen = np.vstack([seen, worst.candidates])
-        if len(new) == 0:
-            converged = True
+        converged = len(new) == 0
+        if converged and (gain is None or (number and worst.gamma > (1.0 - gain) * rounds[-2].worst.gamma)):
             break
-        if time.monotonic() >= end:
+        if result.interrupted or time.monotonic() >= end:
             break
         active.exchange(result.gammas, new)
-        starts = [np.asarray(result.parameters)]
+        best = min(rounds, key=lambda r: r.worst.gamma)
+        # a round that left the box in a worse state is gone on with beside the best one
+        starts = [np.asarray(r.result.parameters) for r in ((best, rounds[-1]) if best is not rounds[-1] else (best,))]
     checks = [] if converged else [BoxNorms(family, controller, np.asarray(r.result.parameters)) for r in rounds]
     final, value, where = rounds[-1], rounds[-1].worst.gamma, rounds[-1].worst.position
     if not converged:

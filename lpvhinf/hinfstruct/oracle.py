@@ -27,7 +27,7 @@ from lpvhinf.hinfstruct.response import Response
 LARGEST = 1e9
 #: Loops of up to so many states are cheaper to evaluate by the exact norm than by peaks.
 SMALL = 20
-#: Plants above this part of the largest norm are tested by exact means, and are what a step must respect.
+#: Plants above this part of the largest norm are tested by exact means, and make the metric.
 NEAR = 0.9
 #: Singular values of a cluster, at most.
 MOST = 8

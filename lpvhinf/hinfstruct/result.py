@@ -95,6 +95,8 @@ class HinfstructResult:
     evaluations : Evaluations
     stabilizing : bool
         Every closed loop is Hurwitz.
+    interrupted : bool
+        The run was ended by an interruption (Ctrl-C); the controller is the best so far.
     constraints : tuple of GoalValue
         Every constraint on its worst plant, recomputed exactly; its level is not above zero.
     objective : float or None
@@ -114,6 +116,7 @@ class HinfstructResult:
     history: tuple[PhaseRecord, ...]
     evaluations: Evaluations
     stabilizing: bool
+    interrupted: bool = False
     constraints: tuple[GoalValue, ...] = ()
     objective: float | None = None
 

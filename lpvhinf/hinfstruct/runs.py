@@ -30,6 +30,8 @@ SCALES = (1.0, 0.3, 0.1, 0.03, 0.01)
 LIMITS, MINIMAL, RETRY, RETRY_GAIN = ("iteration limit", "time limit"), 1e-3, 100, 1e-4
 #: Guard mu against infinite gains, in the first descent of every other random start.
 GUARD = 0.02
+#: Tolerance of a descent that was to be left out, from a start that does not stabilise.
+DESCENT = 0.05
 #: A first descent ends this much earlier than the second one.
 EARLIER = 3.0
 
@@ -57,7 +59,7 @@ class Task:
     seconds: float
     max_iterations: int
     tolerance: float
-    descent_tolerance: float
+    descent_tolerance: float | None
     kick: float = 0.0
     iterations: int = 150
     radius: float | None = None
@@ -109,6 +111,7 @@ def descend(task: Task, listen: Listener | None = None) -> Outcome:
         theta = _kicked(loops, theta, task.kick, rng)
 
     best = AbscissaOracle(loops, budget).evaluate(theta)
+    at_once = task.theta is not None and task.descent_tolerance is None and best.value < -margin
     reason = "stable already"
     for draw in range(DRAWS if task.theta is None else 1):
         if draw:
@@ -144,9 +147,15 @@ def descend(task: Task, listen: Listener | None = None) -> Outcome:
         return outcome(best.theta, np.inf, reason)
     budget = Budget(deadline=budget.deadline, stop=stopped)
     theta, gamma = best.theta, np.inf
+    if at_once:
+        oracle = NormOracle(loops, budget)
+        gamma = oracle.gamma(oracle.evaluate(theta))
+        if np.isfinite(gamma):
+            return outcome(theta, gamma, "left to the polish")
+    tight = DESCENT if task.descent_tolerance is None else task.descent_tolerance
     # every other random start is kept from infinite gains at first: both ways find minima that the other misses
     guards = (GUARD if task.theta is None and task.start % 2 == 0 else 0.0, 0.0)
-    for guard, tolerance in zip(guards, (EARLIER * task.descent_tolerance, task.descent_tolerance), strict=True):
+    for guard, tolerance in zip(guards, (EARLIER * tight, tight), strict=True):
         # the logarithm at first, then about linear in the norm
         offset = gamma if np.isfinite(gamma) else 0.0
         oracle = NormOracle(loops, budget, guard=guard, offset=offset)

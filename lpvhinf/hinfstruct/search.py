@@ -137,10 +137,14 @@ def _polish(
         level = max(HOPELESS * pool.ranked()[0].gamma, SMALLEST)
         chosen = [o for o in _distinct(ranked) if o.gamma <= level and not o.finished]
         chosen = chosen[: max(LEAST_POLISHED, round(part * len(batch)))]
-        count = min(iterations, max_iterations)
-        tasks = [replace(make(o.start, o.theta), iterations=count, radius=o.radius) for o in chosen]
+        chosen = [o for o in chosen if spent[o.start] < max_iterations]
+        counts = [min(iterations, max_iterations - spent[o.start]) for o in chosen]
+        tasks = [
+            replace(make(o.start, o.theta), iterations=count, radius=o.radius)
+            for o, count in zip(chosen, counts, strict=True)
+        ]
         pool.add(runner.map(polish, tasks, share=0.4))
-        for o in chosen:
+        for o, count in zip(chosen, counts, strict=True):
             spent[o.start] += count
     return spent
 

@@ -49,8 +49,9 @@ def hinfstruct(
     checkpoint: Checkpoint | None = None,
     jobs: int = 1,
     max_iterations: int = 1000,
+    polish_iterations: int | None = None,
     tolerance: float = 1e-7,
-    descent_tolerance: float = 1e-2,
+    descent_tolerance: float | None = 1e-2,
     bound: bool = True,
 ) -> HinfstructResult:
     r"""Tune a structured controller for the smallest H-infinity norm over several plants.
@@ -101,11 +102,13 @@ def hinfstruct(
         Processes for the starts. Above one, call from under ``if __name__ == "__main__":``.
     max_iterations : int
         Of each phase of a start.
+    polish_iterations : int, optional
+        Of the polish of one start, where that is to be shorter; default `max_iterations`.
     tolerance : float
         Relative decrease of gamma that counts as progress in the polish.
-    descent_tolerance : float
-        Relative decrease of gamma in 15 iterations below which BFGS hands over to the polish. Smaller values pay
-        with many plants, where kinks slow both phases down.
+    descent_tolerance : float or None
+        Relative decrease of gamma in 15 iterations below which BFGS hands over to the polish. None: starts of the
+        caller that stabilise are left to the polish at once.
     bound : bool
         Compute `lower_bound`, by full-order synthesis of every plant: a second or two for a hundred states.
 
@@ -149,7 +152,7 @@ def hinfstruct(
                 plants, controller, constraints=constraints, objective=objective, points=points,
                 starts=starts if initial is None or initial is first else 0, seed=seed,
                 initial=None if initial is None else list(initial), time_limit=time_limit, progress=progress,
-                checkpoint=checkpoint, jobs=jobs, max_iterations=max_iterations, tolerance=tolerance,
+                checkpoint=checkpoint, jobs=jobs, max_iterations=max_iterations, polish_iterations=polish_iterations, tolerance=tolerance,
                 descent_tolerance=descent_tolerance, bound=bound,
             )  # fmt: skip
 
@@ -164,8 +167,11 @@ def hinfstruct(
         whole_number("starts", starts, 0 if given else 1)
     for name, value, least in (("seed", seed, 0), ("jobs", jobs, 1), ("max_iterations", max_iterations, 1)):
         whole_number(name, value, least)
+    if polish_iterations is not None:
+        whole_number("polish_iterations", polish_iterations, 1)
     positive("tolerance", tolerance)
-    positive("descent_tolerance", descent_tolerance)
+    if descent_tolerance is not None:
+        positive("descent_tolerance", descent_tolerance)
     deadline = np.inf if time_limit is None else time.monotonic() + positive("time_limit", time_limit, "s")
     realize_checked(controller, given[0] if given else controller.initial(np.random.default_rng(seed)), positions[0])
     check_movable(models)
@@ -189,7 +195,8 @@ def hinfstruct(
     oracle = NormOracle(loops, Budget())
     cost = len(models) * (1.0 + (loops.n_states / SMALL) ** 2)
     with threadpool_limits(limits=1), Runner(progress, checkpoint, jobs, deadline) as runner:
-        pool = search(runner, make, given, starts, cost, controller.n_parameters, max_iterations)
+        most = max_iterations if polish_iterations is None else polish_iterations
+        pool = search(runner, make, given, starts, cost, controller.n_parameters, most)
         candidates = pool.ranked()[:3]
         if runner.interrupted and runner.theta is not None:
             candidates = [_heard(runner), *candidates]
@@ -214,7 +221,7 @@ def hinfstruct(
         # of equal ones that which is known best to be a minimum
         found = min((r for r in results if r.gamma <= level), key=lambda r: (r.optimality, r.gamma), default=None)
         if found is not None and found.stabilizing:
-            return found
+            return replace(found, interrupted=runner.interrupted)
         if runner.interrupted:
             raise KeyboardInterrupt("interrupted before stabilising parameters were found")
         closest = min(pool.latest.values(), key=lambda o: (o.abscissa, o.start))

@@ -167,6 +167,7 @@ def test_interruption_returns_the_best_so_far() -> None:
     result = hinfstruct(random_plant(3), StaticGain(2, 2), starts=3, progress=Stopper())
     assert result.stabilizing
     assert "interrupted" in result.status
+    assert result.interrupted
     assert result.gamma == pytest.approx(norms(result, [random_plant(3)])[0], rel=1e-9)
 
 
