@@ -26,8 +26,10 @@ from lpvhinf.statespace.lpv_generalized import LPVGeneralizedPlant
 IDLE = 0.8
 #: after so many rounds in a row.
 PATIENCE = 2
-#: Positions that one search may add.
-MOST_ADDED = 3
+#: A round that is so many tolerances from its active set is gone on with alone, until rounds do not improve on it.
+CLOSE, STALLS = 3.0, 2
+#: Positions that one search may add, and those that it looks at, at least.
+MOST_ADDED, LEAST_SEARCH = 3, 16
 
 
 class Solve(Protocol):
@@ -231,10 +233,14 @@ def hinfstruct_over_box(
         points = read_only(active.points)
         result = _solved(solve, family.sample(points), points, starts, rounds)
         progress.stage(f"worst position over the box, round {number + 1}")
-        worst = worst_over_box(
-            family, controller, result.parameters, n_search=n_search, n_refine=n_refine, seed=seed + 1 + number,
-            known=seen,
-        )  # fmt: skip
+        for part in (max(LEAST_SEARCH, n_search // 4), n_search):
+            # where a quarter of the search finds worse positions the rest can wait for a better controller
+            worst = worst_over_box(
+                family, controller, result.parameters, n_search=min(part, n_search), n_refine=n_refine,
+                seed=seed + 1 + number, known=seen,
+            )  # fmt: skip
+            if worst.gamma > (1.0 + tolerance) * result.gamma or part >= n_search:
+                break
         progress.log(f"gamma {result.gamma:.5g} at {len(points)} positions, {worst.gamma:.5g} over the box")
         rounds.append(Round(positions=points, result=result, worst=worst))
         new = worst.candidates[worst.gammas > (1.0 + tolerance) * result.gamma][:MOST_ADDED]
@@ -246,8 +252,13 @@ def hinfstruct_over_box(
             break
         active.exchange(result.gammas, new)
         best = min(rounds, key=lambda r: r.worst.gamma)
-        # a round that left the box in a worse state is gone on with beside the best one
-        starts = [np.asarray(r.result.parameters) for r in ((best, rounds[-1]) if best is not rounds[-1] else (best,))]
+        starts = [np.asarray(best.result.parameters)]
+        close = best.worst.gamma <= (1.0 + CLOSE * tolerance) * best.result.gamma
+        if close and len(rounds) - rounds.index(best) > STALLS:
+            break
+        if best is not rounds[-1] and not close:
+            # neither is good over the box yet: go on with both
+            starts.append(np.asarray(result.parameters))
     checks = [] if converged else [BoxNorms(family, controller, np.asarray(r.result.parameters)) for r in rounds]
     final, value, where = rounds[-1], rounds[-1].worst.gamma, rounds[-1].worst.position
     if not converged:

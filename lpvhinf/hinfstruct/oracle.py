@@ -175,7 +175,7 @@ class NormOracle:
         i = models.decisive
         peaks, loop = models.peaks[i], models.loops[i]
         assert peaks is not None and loop is not None
-        gain = peak_gain(loop, float(peaks.omega[0]))
+        gain = peak_gain(loop, float(peaks.omega[0]), 0.0, 1)
         pulled = self.loops.pullback(point.theta, i, gain.gradient(np.ones(1, dtype=complex)))
         return np.asarray(pulled / (max(gain.sigma[0], SMALLEST) + self.offset) + self._guard_gradient(point.theta))
 

@@ -152,8 +152,8 @@ def hinfstruct(
                 plants, controller, constraints=constraints, objective=objective, points=points,
                 starts=starts if initial is None or initial is first else 0, seed=seed,
                 initial=None if initial is None else list(initial), time_limit=time_limit, progress=progress,
-                checkpoint=checkpoint, jobs=jobs, max_iterations=max_iterations, polish_iterations=polish_iterations, tolerance=tolerance,
-                descent_tolerance=descent_tolerance, bound=bound,
+                checkpoint=checkpoint, jobs=jobs, max_iterations=max_iterations, polish_iterations=polish_iterations,
+                tolerance=tolerance, descent_tolerance=descent_tolerance, bound=bound,
             )  # fmt: skip
 
         first = checked_initial(initial, controller.n_parameters) or None
