@@ -28,7 +28,7 @@ WARM_POSITIONS, WARM_TOLERANCE = 6, 0.01
 # Iterations of the solver in the first round of an exchange and in the others, and the gain that is worth a round.
 FIRST_ITERATIONS, ROUND_ITERATIONS, ROUND_GAIN = 12, 10, 0.005
 # Positions that the solver sees at once, unless more are asked for; and climbs of each search for a worse one.
-MAX_ACTIVE = 15
+MAX_ACTIVE = 24
 N_REFINE = 3
 
 Checkpoint = Callable[[Array, float], None]

@@ -24,8 +24,8 @@ from lpvhinf.statespace.lpv_generalized import LPVGeneralizedPlant
 
 #: A position whose norm stays below this fraction of the largest one is of no use to the active set,
 IDLE = 0.8
-#: after so many rounds in a row.
-PATIENCE = 2
+#: after so many rounds in a row; rounds that end above this multiple of the best one do not count.
+PATIENCE, USUAL = 2, 1.5
 #: A round that is so many tolerances from its active set is gone on with alone, until rounds do not improve on it.
 CLOSE, STALLS = 3.0, 2
 #: Positions that one search may add, and those that it looks at, at least.
@@ -103,6 +103,7 @@ class ActiveSet:
         self._width = box[:, 1] - box[:, 0]
         self._idle = np.zeros(len(points), dtype=int)
         self._kept = np.zeros(len(points), dtype=bool)
+        self._least = np.inf
         self._dropped = np.zeros((0, points.shape[1]))
 
     def exchange(self, gammas: Array, new: Array) -> None:
@@ -117,7 +118,9 @@ class ActiveSet:
         """
         new = new[: self.limit]
         level = float(np.max(gammas))
-        self._idle = np.where(gammas < IDLE * level, self._idle + 1, 0)
+        self._least = min(self._least, level)
+        if level <= USUAL * self._least:  # else one bad position tells nothing about the others
+            self._idle = np.where(gammas < IDLE * level, self._idle + 1, 0)
         leave = (self._idle >= PATIENCE) & ~self._kept
         spare = len(self.points) - int(np.sum(leave)) + len(new) - self.limit
         if spare > 0:
@@ -234,12 +237,12 @@ def hinfstruct_over_box(
         result = _solved(solve, family.sample(points), points, starts, rounds)
         progress.stage(f"worst position over the box, round {number + 1}")
         for part in (max(LEAST_SEARCH, n_search // 4), n_search):
-            # where a quarter of the search finds worse positions the rest can wait for a better controller
+            # where a quarter of the search finds far worse positions the rest can wait for a better controller
             worst = worst_over_box(
                 family, controller, result.parameters, n_search=min(part, n_search), n_refine=n_refine,
                 seed=seed + 1 + number, known=seen,
             )  # fmt: skip
-            if worst.gamma > (1.0 + tolerance) * result.gamma or part >= n_search:
+            if worst.gamma > (1.0 + CLOSE * tolerance) * result.gamma or part >= n_search:
                 break
         progress.log(f"gamma {result.gamma:.5g} at {len(points)} positions, {worst.gamma:.5g} over the box")
         rounds.append(Round(positions=points, result=result, worst=worst))
