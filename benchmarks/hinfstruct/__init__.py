@@ -1,1 +1,1 @@
-"""Structured H-infinity synthesis on the COMPleib systems: ``python -m benchmarks.hinfstruct``."""
+"""Structured H-infinity synthesis on three sets of problems: ``python -m benchmarks.hinfstruct``."""

@@ -10,7 +10,14 @@ import numpy as np
 
 from lpvhinf.checks import Array
 from lpvhinf.codesign.specification import Specification
-from lpvhinf.controllers import RigidBodyStructure, initial_gain, observer_model, process_noise, riccati_gain
+from lpvhinf.controllers import (
+    FreeRigidBodyStructure,
+    RigidBodyStructure,
+    initial_gain,
+    observer_model,
+    process_noise,
+    riccati_gain,
+)
 from lpvhinf.decoupling import DecoupledPlant
 from lpvhinf.fitting import interpolate
 from lpvhinf.hinfstruct import BlockDiagonal, ControllerStructure, DiagonalGain, StaticGain
@@ -121,10 +128,24 @@ class Assembly:
         return [self.problem(loop).at(centre) for loop in self.frozen_loops(points)]
 
     @cached_property
-    def rigid_body(self) -> RigidBodyStructure:
-        """The structure of K_RB."""
+    def rigid_body(self) -> RigidBodyStructure | FreeRigidBodyStructure:
+        """The structure of K_RB: the paper's PID, with the notches that are asked for, or one of free order."""
         w = 2 * np.pi * self.scaling.f_bw
-        return RigidBodyStructure(self.filters.f_I, w**2)
+        spec = self.specification
+        if spec.order_K_RB is not None:
+            f_states = self._frequencies((spec.order_K_RB - 1) // 2)
+            return FreeRigidBodyStructure(self.filters.f_I, w**2, spec.order_K_RB, f_states)
+        return RigidBodyStructure(self.filters.f_I, w**2, spec.n_notches, self._frequencies(spec.n_notches))
+
+    def _frequencies(self, n: int) -> Array:
+        """Where n notches start [Hz]: known flexible modes, those that u_RB drives first; then octaves above."""
+        known = self.plant.known
+        omega = known.omega[known.n_rb :]
+        if known.input_decoupling == "extended":
+            omega = np.concatenate([omega[known.n_flex :], omega[: known.n_flex]])
+        f = omega[:n] / (2 * np.pi)
+        highest = float(np.max(np.concatenate([f, self.scaling.f_bw])))
+        return np.concatenate([f, highest * 2.0 ** np.arange(1, n - len(f) + 1)])
 
     @cached_property
     def structure(self) -> ControllerStructure:
@@ -145,6 +166,11 @@ class Assembly:
         n_o = self.observer.model.n_x
         # the structure tunes u_FM = k v, k = -xi of either sign
         return theta[:n], theta[n : n + n_o * n_out].reshape(n_o, n_out), -theta[n + n_o * n_out :]
+
+    def translated(self, other: Assembly, theta: Array) -> Array:
+        """The parameters here of a design of another assembly with the same architecture, K_RB in the units of this."""
+        own = self.rigid_body.parameters(other.rigid_body.gains(other.split(theta)[0]))
+        return np.concatenate([own, np.asarray(theta)[other.rigid_body.n_parameters :]])
 
     def tuned_parts(self, theta: Array) -> TunedParts:
         """The tuned part at theta."""

@@ -210,5 +210,4 @@ def _initial(
 
 def _translated(assembly: Assembly, design: Design) -> Array:
     """The parameters of a design of the same architecture, K_RB in this design's units."""
-    own = assembly.rigid_body.parameters(design.K_RB)
-    return np.concatenate([own, np.asarray(design.parameters)[len(own) :]])
+    return assembly.translated(design.assembly, np.asarray(design.parameters))

@@ -13,7 +13,8 @@ import numpy as np
 from lpvhinf.checks import Array
 from lpvhinf.codesign.assembly import Assembly
 from lpvhinf.codesign.specification import Specification
-from lpvhinf.controllers import RigidBodyGains, band_pass, velocity_selection
+from lpvhinf.controllers import RigidBodyGains, RigidBodyStateSpace, band_pass, velocity_selection
+from lpvhinf.controllers.rigid_body import PARAMETERS
 from lpvhinf.problems.wiring import Wiring
 from lpvhinf.statespace.lpv import LPVStateSpace
 from lpvhinf.storage import write_arrays
@@ -77,8 +78,8 @@ class Design:
         return bool(np.all(np.isfinite(self.gammas)))
 
     @cached_property
-    def K_RB(self) -> RigidBodyGains:
-        """The rigid-body controller in physical units."""
+    def K_RB(self) -> RigidBodyGains | RigidBodyStateSpace:
+        """The rigid-body controller in physical units: gains of PIDs and notches, or a state space per axis."""
         return self.assembly.rigid_body.gains(self.assembly.split(self.parameters)[0])
 
     @cached_property
@@ -182,12 +183,15 @@ class Design:
             "status": np.array(self.status),
             "seconds": self.seconds,
             "architecture": np.array(self.architecture),
-            "K_RB": np.stack([getattr(self.K_RB, n) for n in ("gain", "f_i", "f_d", "f_lp", "zeta_lp")]),
             "f_bw": self.assembly.scaling.f_bw,
             "scaling_output": self.assembly.scaling.output,
             "scaling_input": self.assembly.scaling.input,
             "scaling_state": self.assembly.scaling.state,
         }
+        parts = self.K_RB.arrays()
+        if isinstance(self.K_RB, RigidBodyGains):
+            arrays["K_RB"] = np.stack([parts.pop(name) for name in PARAMETERS])
+        arrays |= {f"K_RB_{name}": value for name, value in parts.items()}  # notches, or state spaces
         if self.L is not None and self.xi is not None:
             arrays |= {"L": self.L, "xi": self.xi}
         self.assembly.plant.system.save(folder / "plant.npz")
@@ -198,18 +202,14 @@ class Design:
 
     def report(self) -> str:
         """The design in a few lines of text."""
-        K, f_bw = self.K_RB, self.assembly.scaling.f_bw
+        f_bw = self.assembly.scaling.f_bw
         names = AXES if len(f_bw) == len(AXES) else tuple(f"axis {i + 1}" for i in range(len(f_bw)))
         lines = [
             f"{self.architecture} design for {np.unique(f_bw).tolist()} Hz at {len(self.positions)} positions",
             f"  gamma            {self.gamma:.3f} at the design positions, {self.gamma_worst:.3f} over P (searched)",
             f"  worst position   {(1e3 * self.worst_position).round(1).tolist()} mm",
-            "  axis   gain 1/s2   f_i Hz   f_d Hz  f_lp Hz  zeta_lp",
+            *self.K_RB.table(names),
         ]
-        for i, name in enumerate(names):
-            lines.append(
-                f"  {name:6s} {K.gain[i]:9.0f} {K.f_i[i]:8.2f} {K.f_d[i]:8.2f} {K.f_lp[i]:8.1f} {K.zeta_lp[i]:8.2f}"
-            )
         if self.xi is not None:
             pairs = zip(self.assembly.omega_flex, self.xi, strict=True)
             lines += [f"  mode {w / (2 * np.pi):.1f} Hz: xi = {xi:.1f} 1/s" for w, xi in pairs]

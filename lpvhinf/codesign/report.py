@@ -39,7 +39,7 @@ def figures(design: Design, measures: Measures) -> dict[str, Any]:
         "damping_min": np.min(measures.damping, axis=0),
         "damping_max": np.max(measures.damping, axis=0),
         "discarded_damping_min": float(np.min(measures.discarded_damping)),
-        "K_RB": {name: getattr(design.K_RB, name) for name in ("gain", "f_i", "f_d", "f_lp", "zeta_lp")},
+        "K_RB": design.K_RB.arrays(),
         "xi": design.xi,
         "controller_states": design.controller.n_x,
     }

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from lpvhinf.checks import Array, finite_array, known_options, positive
+from lpvhinf.checks import Array, finite_array, known_options, positive, whole_number
 from lpvhinf.decoupling import DecoupledPlant
 from lpvhinf.errors import DomainError, LpvHinfWarning
 from lpvhinf.shaping import ShapingFilters
@@ -41,11 +41,16 @@ class Specification:
         Of the band-pass in K_FM.
     delay : [s]
         Loop delay, as a Padé filter of order `delay_order` at the plant's outputs; 0 for none, as in the paper.
+    n_notches : int
+        Notches in series with each PID of K_RB; 0 as in the paper.
+    order_K_RB : int, optional
+        States per axis of a K_RB of free order, its integrator not counted, in place of the paper's PID.
 
     Raises
     ------
     DomainError
-        If a value is not finite and above zero (delay: not below zero), or an option is unknown.
+        If a value is not finite and above zero (delay: not below zero), an option is unknown, n_notches is below 0,
+        order_K_RB below 2, or both are given.
 
     Examples
     --------
@@ -66,6 +71,8 @@ class Specification:
     Q: float = 1.0
     delay: float = 0.0
     delay_order: int = 2
+    n_notches: int = 0
+    order_K_RB: int | None = None
 
     def __post_init__(self) -> None:
         for name in ("integral_ratio", "roll_off_ratio", "alpha", "K_s", "K_r", "beta_1", "beta_2", "Q"):
@@ -80,6 +87,14 @@ class Specification:
             raise DomainError(f"delay_order is {self.delay_order!r}, wanted a whole number of at least 1.")
         if self.beta_1 <= self.beta_2:
             raise DomainError(f"beta_1 = {self.beta_1}, beta_2 = {self.beta_2}; wanted beta_1 > beta_2.")
+        whole_number("n_notches", self.n_notches, 0)
+        if self.order_K_RB is not None:
+            whole_number("order_K_RB", self.order_K_RB, 2)
+            if self.n_notches:
+                raise DomainError(
+                    f"n_notches is {self.n_notches} and order_K_RB is {self.order_K_RB}, wanted only one of them. "
+                    "A notch is worth two states of a free order: leave n_notches out."
+                )
 
     @classmethod
     def from_mapping(cls, settings: dict[str, Any]) -> Specification:

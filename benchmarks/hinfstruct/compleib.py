@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
-import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.hinfstruct.measuring import Stopwatch, finished, slicot_ratio
 from lpvhinf.errors import LpvHinfError, StorageError
-from lpvhinf.hinfstruct import ControllerStructure, FixedOrder, StaticGain, hinf_norm, hinfstruct
+from lpvhinf.hinfstruct import ControllerStructure, FixedOrder, StaticGain, hinfstruct
 from lpvhinf.statespace.generalized import GeneralizedPlant
 
 MATRICES = ("A", "B1", "B", "C1", "C", "D11", "D12", "D21")
@@ -20,18 +21,24 @@ DYNAMIC = ("AC4", "AC7", "HE1", "NN2")
 
 @dataclass(frozen=True, kw_only=True)
 class Problem:
-    """A system, the controller's order, and what is known; NaN where nothing is."""
+    """A system, the controller's order, the seed, and what is known; NaN where nothing is."""
 
     name: str
     order: int
+    seed: int
     best_known: float
     hifoo: float
     hifoo_cpu: float
 
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What tells it from others."""
+        return self.name, self.order, self.seed
+
 
 @dataclass(frozen=True, kw_only=True)
-class Run:
-    """The outcome of one seed; `ratio` is gamma over the best known norm, `slicot` that of our norm by SLICOT."""
+class CompleibRun:
+    """The outcome of one seed; `ratio` is gamma over the best known norm, `slicot` SLICOT's norm over gamma."""
 
     name: str
     order: int
@@ -41,6 +48,7 @@ class Run:
     best_known: float
     hifoo: float
     hifoo_cpu: float
+    wall: float
     cpu: float
     trials: int
     exact: int
@@ -48,9 +56,20 @@ class Run:
     largest_parameter: float
     status: str
 
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What tells it from others."""
+        return self.name, self.order, self.seed
 
-def problems(folder: Path) -> list[Problem]:
-    """Static output feedback for every system, then orders 1 and 2 for a few.
+    def __str__(self) -> str:
+        return (
+            f"{self.name:6} order {self.order} seed {self.seed}: gamma {self.gamma:.6g}, ratio {self.ratio:.4f}, "
+            f"{self.cpu:.1f} s"
+        )
+
+
+def problems(folder: Path, seeds: Iterable[int]) -> list[Problem]:
+    """For every seed static output feedback for every system, then orders 1 and 2 for a few.
 
     Raises
     ------
@@ -62,19 +81,22 @@ def problems(folder: Path) -> list[Problem]:
     except (OSError, ValueError, KeyError) as error:
         raise StorageError(f"{folder}/reference.json cannot be read: {error}. Name the folder by --data.") from error
     out = []
-    for name, known in systems.items():
-        hifoo = known.get("hifoo", {})
-        out.append(
-            Problem(
-                name=name,
-                order=0,
-                best_known=float(known["best_known_gamma"]),
-                hifoo=float(hifoo.get("gamma", np.nan)),
-                hifoo_cpu=float(hifoo.get("cpu_s", np.nan)),
+    for seed in seeds:
+        for name, known in systems.items():
+            hifoo = known.get("hifoo", {})
+            out.append(
+                Problem(
+                    name=name,
+                    order=0,
+                    seed=seed,
+                    best_known=float(known["best_known_gamma"]),
+                    hifoo=float(hifoo.get("gamma", np.nan)),
+                    hifoo_cpu=float(hifoo.get("cpu_s", np.nan)),
+                )
             )
-        )
-    nothing = {"best_known": np.nan, "hifoo": np.nan, "hifoo_cpu": np.nan}
-    return out + [Problem(name=n, order=k, **nothing) for n in DYNAMIC if n in systems for k in (1, 2)]
+        nothing = {"best_known": np.nan, "hifoo": np.nan, "hifoo_cpu": np.nan}
+        out += [Problem(name=n, order=k, seed=seed, **nothing) for n in DYNAMIC if n in systems for k in (1, 2)]
+    return out
 
 
 def load(folder: Path, name: str) -> GeneralizedPlant:
@@ -83,31 +105,33 @@ def load(folder: Path, name: str) -> GeneralizedPlant:
         return GeneralizedPlant(*[data[key] for key in MATRICES])
 
 
-def solve(plant: GeneralizedPlant, problem: Problem, seed: int) -> Run:
+def solve(plant: GeneralizedPlant, problem: Problem) -> CompleibRun:
     """Solve with the default settings; the norm is checked by SLICOT on the closed loop."""
     n_u, n_y = plant.n_u, plant.n_y
     structure: ControllerStructure = FixedOrder(problem.order, n_u, n_y) if problem.order else StaticGain(n_u, n_y)
     gamma, slicot, trials, exact, largest = np.inf, np.nan, 0, 0, np.nan
-    began = time.process_time()
+    watch = Stopwatch()
     try:
-        result = hinfstruct(plant, structure, seed=seed)
+        result = hinfstruct(plant, structure, seed=problem.seed)
     except LpvHinfError as error:
-        cpu, status = time.process_time() - began, f"{type(error).__name__}: {error}"
+        (wall, cpu), status = watch.read(), f"{type(error).__name__}: {error}"
     else:
-        cpu, status, gamma = time.process_time() - began, result.status, result.gamma
+        (wall, cpu), status, gamma = watch.read(), result.status, result.gamma
         trials, exact = result.evaluations.trials, result.evaluations.exact
         largest = float(np.max(np.abs(result.parameters)))
+        finished(result.interrupted)
         K = result.controller
-        slicot = independent_norm(plant.close(K.A, K.B, K.C, K.D)) / gamma
-    return Run(
+        slicot = slicot_ratio([plant.close(K.A, K.B, K.C, K.D)], [gamma])
+    return CompleibRun(
         name=problem.name,
         order=problem.order,
-        seed=seed,
+        seed=problem.seed,
         gamma=gamma,
         ratio=gamma / problem.best_known,
         best_known=problem.best_known,
         hifoo=problem.hifoo,
         hifoo_cpu=problem.hifoo_cpu,
+        wall=wall,
         cpu=cpu,
         trials=trials,
         exact=exact,
@@ -115,14 +139,3 @@ def solve(plant: GeneralizedPlant, problem: Problem, seed: int) -> Run:
         largest_parameter=largest,
         status=status,
     )
-
-
-def independent_norm(loop: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]) -> float:
-    """The norm by SLICOT's AB13DD alone; by the package's own iteration where slycot is missing."""
-    A, B, C, D = loop
-    try:
-        import slycot
-    except ImportError:
-        return hinf_norm(A, B, C, D).norm
-    n = A.shape[0]
-    return float(slycot.ab13dd("C", "I", "N", "D", n, B.shape[1], C.shape[0], A, np.eye(n), B, C, D, 1e-10)[0])
