@@ -7,6 +7,7 @@ import signal
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from lpvhinf.checks import Array
+from lpvhinf.errors import SynthesisError
 from lpvhinf.hinfstruct import runs
 from lpvhinf.hinfstruct.runs import Outcome, Task
 from lpvhinf.progress import Progress
@@ -91,6 +93,12 @@ class Runner:
         for future in futures:
             try:
                 outcome = future.result()
+            except BrokenProcessPool as error:
+                raise SynthesisError(
+                    f"jobs is {self.jobs}, but a worker process ended before its work was done. In a script call this "
+                    'under `if __name__ == "__main__":`, as workers import the script anew; else it was killed, '
+                    "perhaps for lack of memory: pass jobs=1."
+                ) from error
             except KeyboardInterrupt:
                 # the workers see the event at their next evaluation, and hand back what they have
                 self.interrupted = True

@@ -304,3 +304,27 @@ def test_bad_plants_and_controllers() -> None:
         hinfstruct(first_order(), StaticGain(2, 1))
     with pytest.raises(DomainError, match="protocol"):
         hinfstruct(first_order(), 3.0)  # type: ignore[arg-type]
+
+
+UNGUARDED = """
+import numpy as np
+from lpvhinf import StaticGain, hinfstruct
+from tests.hinfstruct.plants import first_order
+
+hinfstruct(first_order(), StaticGain(1, 1), starts=2, jobs=2)
+"""
+
+
+def test_a_script_without_guard_is_told_so(tmp_path: Path) -> None:
+    script = tmp_path / "unguarded.py"
+    script.write_text(UNGUARDED)
+    root = Path(__file__).parents[2]
+    run = subprocess.run(
+        [sys.executable, str(script)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env=os.environ | {"PYTHONPATH": str(root)},
+    )
+    assert run.returncode != 0
+    assert 'call this under `if __name__ == "__main__":`' in run.stderr
