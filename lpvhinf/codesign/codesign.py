@@ -127,8 +127,9 @@ def codesign(
         else points_in_box(positions, decoupled.box, name="positions")
     )
 
+    own: Design | None = None
     if architecture == "output-observer" and warm_start is None and rigid_start is None:
-        warm_start = codesign(
+        warm_start = own = codesign(
             decoupled, "rigid-body", spec, positions=active[:WARM_POSITIONS], starts=1, exchange_rounds=0, n_search=1,
             seed=seed, max_iterations=max_iterations, tolerance=max(tolerance, WARM_TOLERANCE),
             time_limit=time_limit, progress=progress,
@@ -185,6 +186,7 @@ def codesign(
         optimality=result.optimality,
         status=result.status,
         seconds=time.monotonic() - began,
+        evaluations=found.evaluations if own is None else found.evaluations + own.evaluations,
     )
 
 

@@ -15,6 +15,7 @@ from lpvhinf.codesign.assembly import Assembly
 from lpvhinf.codesign.specification import Specification
 from lpvhinf.controllers import RigidBodyGains, RigidBodyStateSpace, band_pass, velocity_selection
 from lpvhinf.controllers.rigid_body import PARAMETERS
+from lpvhinf.hinfstruct import Evaluations
 from lpvhinf.problems.wiring import Wiring
 from lpvhinf.statespace.lpv import LPVStateSpace
 from lpvhinf.storage import write_arrays
@@ -45,6 +46,8 @@ class Design:
         What the solver says of its end.
     seconds : float
         Time spent.
+    evaluations : Evaluations
+        Trials and exact norms of all rounds and searches, those of the design that it begins with included.
     """
 
     assembly: Assembly
@@ -56,6 +59,7 @@ class Design:
     optimality: float
     status: str
     seconds: float
+    evaluations: Evaluations
 
     @property
     def architecture(self) -> str:
@@ -182,6 +186,9 @@ class Design:
             "optimality": self.optimality,
             "status": np.array(self.status),
             "seconds": self.seconds,
+            "trials": self.evaluations.trials,
+            "exact_norms": self.evaluations.exact,
+            "every_model_norms": self.evaluations.every_model,
             "architecture": np.array(self.architecture),
             "f_bw": self.assembly.scaling.f_bw,
             "scaling_output": self.assembly.scaling.output,

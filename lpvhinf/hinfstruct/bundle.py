@@ -20,6 +20,8 @@ MEMORY = 3
 PATIENCE = 12
 #: Parts of the radius that are tried before a model is given up.
 SHRINK = (1.0, 0.1, 0.01, 1e-3)
+#: A step that gains less than this part of what straight cuts promise within the same radius is defeated by curvature.
+DEFEAT = 0.05
 
 
 def bundle(
@@ -75,16 +77,17 @@ def bundle(
             size = max(1.0, float(np.linalg.norm(point.theta, np.inf)))
             F = size * np.eye(n) if M is None else unit_steps(M)
         model.F = F
-        step = None
+        step, part = None, 1.0
         for shrink in SHRINK:
             # curvature far larger than the decrease may defeat the model of a large region
-            step = model.step(weights, shrink * radius)
-            if step is not None and step.decrease > 1e-2 * tolerance:
-                radius *= shrink
+            found = model.step(weights, shrink * radius)
+            if found is not None and (step is None or found.decrease > step.decrease):
+                step, part = found, shrink
+            if step is not None and step.decrease > max(1e-2 * tolerance, DEFEAT * model.straight_decrease):
                 break
-        else:
+        if step is None or step.decrease <= 1e-2 * tolerance:
             return Descent(point, "no predicted decrease", iteration, optimality)
-        assert step is not None
+        radius *= part
         trial = oracle.evaluate(point.theta + F @ step.step, point.value - 0.01 * step.decrease)
         if trial.value <= point.value - 0.01 * step.decrease:
             trial = oracle.confirm(trial)
@@ -94,9 +97,9 @@ def bundle(
             growing = ratio > 0.7 and length > 0.8 * radius
             # a small step that the region held back says nothing about convergence
             slow = slow + 1 if point.value - trial.value < tolerance and not growing else 0
-            earlier = [*earlier, [cut for cut, w in zip(model.cuts, step.multipliers, strict=True) if w > 1e-3]][
-                -MEMORY:
-            ]
+            # cuts that joined for a smaller radius come last, and have no multiplier
+            deciding = [cut for cut, w in zip(model.cuts, step.multipliers, strict=False) if w > 1e-3]
+            earlier = [*earlier, deciding][-MEMORY:]
             point, missed, F = trial, [], None
             if accepted is not None:
                 accepted(point)

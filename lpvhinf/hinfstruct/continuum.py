@@ -16,7 +16,7 @@ from lpvhinf.errors import SynthesisError
 from lpvhinf.fitting import spread_points
 from lpvhinf.hinfstruct.plant_families import PlantFamily, as_family
 from lpvhinf.hinfstruct.position_search import BoxNorms, WorstOverBox, worst_over_box
-from lpvhinf.hinfstruct.result import HinfstructResult
+from lpvhinf.hinfstruct.result import Evaluations, HinfstructResult
 from lpvhinf.hinfstruct.structures import ControllerStructure
 from lpvhinf.progress import SILENT, Progress
 from lpvhinf.statespace.generalized import GeneralizedPlant
@@ -85,6 +85,12 @@ class ContinuumResult:
     n_exact: int
     n_cheap: int
     n_plants: int
+
+    @property
+    def evaluations(self) -> Evaluations:
+        """Of all rounds of synthesis, and the exact norms of the searches, which any other solver needs as well."""
+        searches = Evaluations(trials=0, exact=self.n_exact, every_model=self.n_exact)
+        return sum((r.result.evaluations for r in self.rounds), searches)
 
 
 class ActiveSet:

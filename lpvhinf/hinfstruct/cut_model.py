@@ -30,6 +30,8 @@ class CutModel:
         The latter.
     F : (n, n)
         Columns are unit steps.
+    straight_decrease : float
+        What straight cuts promised within the radius of the last step.
     """
 
     def __init__(self, oracle: Oracle, point: Point, cuts: Sequence[Cut], members: Sequence[Cut] = ()) -> None:
@@ -37,6 +39,7 @@ class CutModel:
         self.cuts = [*cuts, *members]
         n = point.theta.size
         self.F = np.eye(n)
+        self.straight_decrease = 0.0
         self._bent: list[int] = []
         self._H = np.zeros((0, n, n))
         self._gather()
@@ -84,6 +87,7 @@ class CutModel:
         """
         n = self.F.shape[1]
         found = linear = quadratic_model(self.values, self.G @ self.F, self.hard, 1e-9 * np.eye(n), radius)
+        self.straight_decrease = 0.0 if linear is None else linear.decrease
         if linear is None:
             return None
         depth = MET * linear.decrease

@@ -16,7 +16,7 @@ from lpvhinf.hinfstruct.gradient import peak_gain
 from lpvhinf.hinfstruct.loop import ClosedLoop
 from lpvhinf.hinfstruct.metric import OFF_AXIS, SLOW, loop_metric
 from lpvhinf.hinfstruct.norm import NormResult, above_level, exact_norm, slicot_peak
-from lpvhinf.hinfstruct.peaks import Peaks, find_peaks
+from lpvhinf.hinfstruct.peaks import Peaks, find_peaks, plateau
 from lpvhinf.hinfstruct.problem import Budget as Budget
 from lpvhinf.hinfstruct.problem import Cut as Cut
 from lpvhinf.hinfstruct.problem import Oracle as Oracle
@@ -29,6 +29,8 @@ LARGEST = 1e9
 SMALL = 20
 #: Plants above this part of the largest norm are tested by exact means, and make the metric.
 NEAR = 0.9
+#: Between peaks the response counts as a plateau above this part of the largest norm.
+FLAT = 0.98
 #: Singular values of a cluster, at most.
 MOST = 8
 #: Frequencies that differ by less, relatively, are one.
@@ -249,6 +251,8 @@ class NormOracle:
             peaks = find_peaks(models.response(i), extra=extra, fraction=0.0, floor=floor)
             for omega in peaks.omega:
                 out += self._cuts_at(point, i, float(omega), self.cluster)
+            for omega in plateau(models.response(i), peaks.omega, FLAT * models.top):
+                out += self._cuts_at(point, i, float(omega), 0.02)
         return out
 
     def _cuts_at(self, point: Point, plant: int, omega: float, cluster: float) -> list[Cut]:

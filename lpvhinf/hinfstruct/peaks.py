@@ -13,6 +13,8 @@ from lpvhinf.hinfstruct.response import Response, largest_sigma
 OFFSETS = np.array([-4.0, -1.5, -0.6, 0.0, 0.6, 1.5, 4.0])
 #: A pole counts as lightly damped below this damping ratio.
 LIGHT = 0.35
+#: Frequencies to a decade that are looked at for a plateau, and their distance from a peak, in units of its logarithm.
+PER_DECADE, APART = 4.0, 0.2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,6 +88,25 @@ def find_peaks(T: Response, *, extra: Array, fraction: float = 0.7, floor: float
     where, height = where[order], height[order]
     chosen = height >= max(fraction * height[0], min(floor, height[0]))
     return Peaks(where[chosen], height[chosen])
+
+
+def plateau(T: Response, peaks: Array, level: float) -> Array:
+    """Frequencies away from the peaks at which the largest singular value is above a level, (k,) rad/s.
+
+    Where a minimiser has flattened the response, any frequency of the plateau becomes a peak after a small step.
+    """
+    omega = _background(T.poles)
+    proper = peaks[np.isfinite(peaks) & (peaks > 0.0)]
+    far = np.all(np.abs(np.log(omega[:, None] / proper)) > APART, axis=1)
+    omega = omega[far]
+    return omega[largest_sigma(T.at(omega)) >= level] if omega.size else omega
+
+
+def _background(poles: np.ndarray) -> Array:
+    """Some frequencies to a decade, around the range of the poles."""
+    size = np.maximum(np.abs(poles), 1e-12)
+    low, high = (0.1 * float(np.min(size)), 10.0 * float(np.max(size))) if size.size else (0.1, 10.0)
+    return np.geomspace(low, high, int(np.clip(PER_DECADE * np.log10(high / low), 6, 24)))
 
 
 def _slope(T: Response, omega: Array) -> tuple[Array, Array]:

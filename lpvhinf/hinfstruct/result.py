@@ -62,6 +62,13 @@ class Evaluations:
     exact: int
     every_model: int
 
+    def __add__(self, other: Evaluations) -> Evaluations:
+        return Evaluations(
+            trials=self.trials + other.trials,
+            exact=self.exact + other.exact,
+            every_model=self.every_model + other.every_model,
+        )
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HinfstructResult:

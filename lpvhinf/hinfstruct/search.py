@@ -24,10 +24,10 @@ LEAST_POLISHED = 2
 #: Evaluations that an adaptive search may take, in evaluations of a small loop.
 EFFORT = 8500.0
 #: What an iteration of the polish costs, in such evaluations, and more for every parameter.
-POLISH_COST, POLISH_COST_EACH = 10.0, 0.4
+POLISH_COST, POLISH_COST_EACH = 10.0, 0.8
 #: With limited effort the best start is polished on by so many iterations as long as they gain this part of the norm,
 #: up to this multiple of the effort.
-CHUNK, GAIN, LONGEST = 50, 1e-3, 1.5
+CHUNK, GAIN, LONGEST = 50, 1e-3, 4.0
 #: Chunks without such a gain, all but the first begun anew, after which other starts have their turn.
 STALLS = 2
 #: Ends within this of each other are the same minimum; so many starts must agree on the best one.

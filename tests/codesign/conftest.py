@@ -10,6 +10,7 @@ import pytest
 from lpvhinf.codesign import Design, Specification, codesign
 from lpvhinf.codesign.assembly import Assembly
 from lpvhinf.decoupling import DecoupledPlant
+from lpvhinf.hinfstruct import Evaluations
 
 WANTED = Specification(f_bw=[12.0, 15.0], expected_error=[2e-6, 5e-5], epsilon=0.05, Q=0.8)
 
@@ -59,6 +60,7 @@ def with_parameters() -> Callable[[Assembly, list[float] | np.ndarray], Design]:
             optimality=np.nan,
             status="given",
             seconds=0.0,
+            evaluations=Evaluations(trials=0, exact=0, every_model=0),
         )
 
     return make
