@@ -120,8 +120,7 @@ def solve(plant: GeneralizedPlant, problem: Problem) -> CompleibRun:
         trials, exact = result.evaluations.trials, result.evaluations.exact
         largest = float(np.max(np.abs(result.parameters)))
         finished(result.interrupted)
-        K = result.controller
-        slicot = slicot_ratio([plant.close(K.A, K.B, K.C, K.D)], [gamma])
+        slicot = slicot_ratio([plant.close(*structure.realize(result.parameters))], [gamma])
     return CompleibRun(
         name=problem.name,
         order=problem.order,

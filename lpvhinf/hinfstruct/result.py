@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     import control
 
     from lpvhinf.hinfstruct.goals import GoalValue
+    from lpvhinf.statespace.lpv import LPVStateSpace
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,8 +79,8 @@ class HinfstructResult:
     ----------
     gamma : float
         Largest norm over the plants, recomputed exactly on the closed loops.
-    controller : control.StateSpace
-        K with u = + K y. Where the structure is scheduled, K at `worst_position`.
+    controller : control.StateSpace or LPVStateSpace
+        K with u = + K y; an LPVStateSpace where the structure is `Scheduled`.
     parameters : (n_parameters,)
         theta of the structure.
     gammas : (n_plants,)
@@ -111,7 +112,7 @@ class HinfstructResult:
     """
 
     gamma: float
-    controller: control.StateSpace
+    controller: control.StateSpace | LPVStateSpace
     parameters: Array
     gammas: Array
     gamma_worst: float

@@ -10,9 +10,13 @@ from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 
 from lpvhinf.checks import Array, box_array, points_in_box, whole_number
-from lpvhinf.errors import DimensionError
+from lpvhinf.errors import AssumptionError, DimensionError
 from lpvhinf.hinfstruct.structures import ControllerStructure, Realization, parameter_names
 from lpvhinf.polynomial import scaled
+from lpvhinf.statespace.lpv import LPVStateSpace
+
+#: Relative error of every matrix of an interpolated controller, and the highest degree that is tried for it.
+PRECISE, MOST_DEGREE = 1e-10, 64
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -123,6 +127,36 @@ class Scheduled:
     def realize(self, theta: Array, p: Array | None = None) -> Realization:
         """The inner structure at theta(p)."""
         return self.structure.realize(self.frozen(theta, p), p)
+
+    def over_box(self, theta: Array) -> LPVStateSpace:
+        """The controller over the whole box: exact where the inner structure is affine in its parameters.
+
+        Else (logarithms of gains, damping ratios) it is interpolated, with a degree that is raised until the measured
+        error of every matrix is below `PRECISE`, relative to its largest entry.
+
+        Raises
+        ------
+        AssumptionError
+            If that takes a degree above `MOST_DEGREE`.
+        """
+
+        def sampled(points: Array) -> tuple[Array, Array, Array, Array]:
+            A, B, C, D = zip(*(self.realize(theta, p) for p in points), strict=True)
+            return np.stack(A), np.stack(B), np.stack(C), np.stack(D)
+
+        degree, worst = max(1, self.basis.degree), np.inf
+        while degree <= MOST_DEGREE:
+            fit = LPVStateSpace.interpolate(sampled, box=self.basis.box, degree=degree)
+            sizes = [float(np.max(np.abs(m.coefficients), initial=0.0)) for m in fit.system.matrices]
+            errors = [float(np.max(fit.errors[name], initial=0.0)) for name in "ABCD"]
+            worst = max(error / max(size, 1e-300) for error, size in zip(errors, sizes, strict=True))
+            if worst <= PRECISE:
+                return fit.system
+            degree *= 2
+        raise AssumptionError(
+            f"the scheduled controller is no polynomial of degree {MOST_DEGREE} to {PRECISE:g}: its relative error is "
+            f"{worst:.1e}. Use realize(theta, p) at single positions, or a basis of lower degree."
+        )
 
     def pullback(self, theta: Array, GA: Array, GB: Array, GC: Array, GD: Array, p: Array | None = None) -> Array:
         """The inner pullback, times every function of the basis."""

@@ -24,6 +24,7 @@ from lpvhinf.hinfstruct.problem import Budget
 from lpvhinf.hinfstruct.result import Evaluations, HinfstructResult
 from lpvhinf.hinfstruct.runner import Checkpoint, Runner
 from lpvhinf.hinfstruct.runs import Outcome, Task
+from lpvhinf.hinfstruct.scheduled import PolynomialBasis, Scheduled
 from lpvhinf.hinfstruct.search import Pool, search
 from lpvhinf.hinfstruct.structures import ControllerStructure, realize_checked
 from lpvhinf.progress import SILENT, Progress
@@ -285,8 +286,8 @@ def _status(outcome: Outcome, runner: Runner) -> str:
         )
     if outcome.reason == "iteration limit":
         return (
-            "stopped by max_iterations before convergence; the controller is valid. Raise max_iterations, or pass its "
-            "parameters as initial to go on."
+            "stopped by its limit of iterations before convergence; the controller is valid. Raise max_iterations, or "
+            "pass its parameters as initial to go on."
         )
     if outcome.gamma <= 1e-6:
         return "the norm is practically zero; nothing is left to gain unless the channels are scaled badly."
@@ -312,10 +313,13 @@ def _result(
     norms = oracle.exact(outcome.theta)
     gammas = np.array([norm.norm for norm in norms])
     worst = int(np.argmax(gammas))
-    A, B, C, D = controller.realize(outcome.theta, positions[worst])
     return HinfstructResult(
         gamma=float(gammas[worst]),
-        controller=control.ss(A, B, C, D),
+        controller=(
+            controller.over_box(outcome.theta)
+            if isinstance(controller, Scheduled) and isinstance(controller.basis, PolynomialBasis)
+            else control.ss(*controller.realize(outcome.theta, positions[worst]))
+        ),
         parameters=read_only(outcome.theta),
         gammas=read_only(gammas),
         gamma_worst=float(gammas[worst]),

@@ -23,6 +23,7 @@ from lpvhinf.hinfstruct.smooth_map import SmoothMap
 from lpvhinf.hinfstruct.sparsity import AffineGain, band_mask, block_mask, pattern_gain
 from lpvhinf.hinfstruct.structures import ControllerStructure, check_structure, report_structure
 from lpvhinf.statespace.generalized import GeneralizedPlant
+from lpvhinf.statespace.lpv import LPVStateSpace
 
 P = np.array([0.3, -0.2])
 BOX = [[-1.0, 1.0], [-0.5, 0.5]]
@@ -285,3 +286,18 @@ def test_a_schedule_reaches_the_optimum_at_every_position() -> None:
     result = hinfstruct(plants, K, points=points, starts=1)
     np.testing.assert_allclose(result.gammas, np.sqrt(2.0), rtol=1e-5)
     np.testing.assert_allclose(result.parameters, [-np.sqrt(2.0), -np.sqrt(0.5)], rtol=1e-3)
+    assert isinstance(result.controller, LPVStateSpace)
+    for p in (-1.0, 0.3, 1.0):
+        np.testing.assert_allclose(result.controller.at([p]).D, K.realize(result.parameters, np.array([p]))[3])
+
+
+def test_a_scheduled_controller_of_logarithms_is_interpolated() -> None:
+    K = Scheduled(Series(Notch(1, f=(1.0, 2.0)), PID(1, sign=-1)), PolynomialBasis(BOX, 1))
+    theta = K.initial(np.random.default_rng(1))
+    theta[K.structure.n_parameters :] = 0.1
+    over_box = K.over_box(theta)
+    for p in np.array([[-0.9, 0.4], [0.2, 0.1], [1.0, -0.5]]):
+        for got, wanted in zip(over_box.sample(p[None]), K.realize(theta, p), strict=True):
+            np.testing.assert_allclose(
+                got[0], wanted, rtol=1e-8, atol=1e-8 * max(1.0, np.max(np.abs(wanted), initial=0))
+            )
