@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import cached_property, reduce
 from typing import ClassVar
 
 import numpy as np
 import scipy.fft
 from numpy.polynomial import chebyshev
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from lpvhinf.checks import Array, box_array, finite_array, points_in_box, read_only
 from lpvhinf.errors import DimensionError, DomainError
@@ -65,9 +65,20 @@ class ChebyshevMatrix:
             )
         object.__setattr__(self, "coefficients", read_only(values))
         object.__setattr__(self, "box", bounds)
-        # Only entries that are not identically zero are ever evaluated: state matrices are sparse.
-        used = np.flatnonzero(np.any(values != 0.0, axis=tuple(range(len(bounds)))))
-        object.__setattr__(self, "_used", used)
+
+    @classmethod
+    def _of(cls, coefficients: Array, box: Array) -> ChebyshevMatrix:
+        """From results of our own arithmetic, unchecked: loops are wired from thousands of small matrices."""
+        out = object.__new__(cls)
+        coefficients.setflags(write=False)
+        object.__setattr__(out, "coefficients", coefficients)
+        object.__setattr__(out, "box", box)
+        return out
+
+    @cached_property
+    def _used(self) -> NDArray[np.intp]:
+        """Entries that are not identically zero; only these are ever evaluated: state matrices are sparse."""
+        return np.flatnonzero(np.any(self.coefficients != 0.0, axis=tuple(range(self.n_p))))
 
     @property
     def n_p(self) -> int:
@@ -101,7 +112,7 @@ class ChebyshevMatrix:
         if self.is_constant or rows * cols == 0:  # a view: one matrix serves every position
             constant = self.coefficients[(0,) * self.n_p]
             return np.broadcast_to(constant, (len(where), rows, cols))
-        used: Array = self._used  # type: ignore[attr-defined]
+        used = self._used
         flat = np.ascontiguousarray(self.coefficients.reshape(-1, rows * cols)[:, used])
         out = np.zeros((len(where), rows * cols))
         step = max(1, CHUNK // len(flat))
@@ -121,10 +132,12 @@ class ChebyshevMatrix:
         if not 0 <= axis < self.n_p:  # a negative one would count from the columns
             raise DomainError(f"axis is {axis}, wanted 0 to {self.n_p - 1}.")
         scale = 2.0 / (self.box[axis, 1] - self.box[axis, 0])
-        return ChebyshevMatrix(chebyshev.chebder(self.coefficients, scl=scale, axis=axis), self.box)
+        return self._of(chebyshev.chebder(self.coefficients, scl=scale, axis=axis), self.box)
 
     def padded(self, degree: Sequence[int]) -> Array:
         """The coefficients with zeros added up to `degree`."""
+        if tuple(degree) == self.degree:
+            return self.coefficients
         grow = [(0, max(0, d - e)) for d, e in zip(degree, self.degree, strict=True)]
         return np.pad(self.coefficients, [*grow, (0, 0), (0, 0)])
 
@@ -135,13 +148,15 @@ class ChebyshevMatrix:
             sizes = np.max(np.abs(np.moveaxis(c, axis, 0)).reshape(c.shape[axis], -1), axis=1, initial=0.0)
             keep = np.flatnonzero(sizes > tolerance)
             c = np.take(c, range(int(keep[-1]) + 1 if len(keep) else 1), axis=axis)
-        return ChebyshevMatrix(c, self.box)
+        return self._of(np.array(c), self.box)
 
     # algebra: exact up to round-off, so that a closed loop has the plant's own degree in p
 
     def _like(self, other: ChebyshevMatrix | ArrayLike) -> ChebyshevMatrix:
         if not isinstance(other, ChebyshevMatrix):
             return ChebyshevMatrix(np.atleast_2d(np.asarray(other, dtype=float)), self.box)
+        if other.box is self.box:
+            return other
         if other.box.shape != self.box.shape or not np.array_equal(other.box, self.box):
             raise DimensionError(f"the boxes {self.box.tolist()} and {other.box.tolist()} differ. Use one box.")
         return other
@@ -151,10 +166,10 @@ class ChebyshevMatrix:
         if right.shape != self.shape:
             raise DimensionError(f"cannot add {self.shape} and {right.shape} matrices.")
         degree = [max(a, b) for a, b in zip(self.degree, right.degree, strict=True)]
-        return ChebyshevMatrix(self.padded(degree) + right.padded(degree), self.box)
+        return self._of(self.padded(degree) + right.padded(degree), self.box)
 
     def __neg__(self) -> ChebyshevMatrix:
-        return ChebyshevMatrix(-self.coefficients, self.box)
+        return self._of(-self.coefficients, self.box)
 
     def __sub__(self, other: ChebyshevMatrix | ArrayLike) -> ChebyshevMatrix:
         return self + -self._like(other)
@@ -164,9 +179,9 @@ class ChebyshevMatrix:
         if self.shape[1] != right.shape[0]:
             raise DimensionError(f"cannot multiply {self.shape} and {right.shape} matrices.")
         if self.is_constant or right.is_constant:
-            return ChebyshevMatrix(self.coefficients @ right.coefficients, self.box)
+            return self._of(self.coefficients @ right.coefficients, self.box)
         size = [a + b + 1 for a, b in zip(self.degree, right.degree, strict=True)]
-        return ChebyshevMatrix(from_nodes(_on_nodes(self, size) @ _on_nodes(right, size), self.n_p), self.box)
+        return self._of(from_nodes(_on_nodes(self, size) @ _on_nodes(right, size), self.n_p), self.box)
 
     def __radd__(self, other: ArrayLike) -> ChebyshevMatrix:
         return self + other
@@ -180,11 +195,11 @@ class ChebyshevMatrix:
     @property
     def T(self) -> ChebyshevMatrix:
         """The transpose."""
-        return ChebyshevMatrix(np.swapaxes(self.coefficients, -1, -2), self.box)
+        return self._of(np.swapaxes(self.coefficients, -1, -2), self.box)
 
     def __getitem__(self, key: tuple[slice | Sequence[int], slice | Sequence[int]]) -> ChebyshevMatrix:
         rows, cols = key
-        return ChebyshevMatrix(self.coefficients[..., rows, :][..., cols], self.box)
+        return self._of(self.coefficients[..., rows, :][..., cols], self.box)
 
     def __repr__(self) -> str:
         return f"ChebyshevMatrix({self.shape[0]}x{self.shape[1]}, degree {self.degree}, box {self.box.tolist()})"
@@ -196,7 +211,7 @@ def block(rows: Sequence[Sequence[ChebyshevMatrix | ArrayLike]], box: ArrayLike)
     cells = [[empty._like(cell) for cell in row] for row in rows]
     degree = [max(cell.degree[i] for row in cells for cell in row) for i in range(empty.n_p)]
     joined = [np.concatenate([cell.padded(degree) for cell in row], axis=-1) for row in cells]
-    return ChebyshevMatrix(np.concatenate(joined, axis=-2), box)
+    return empty._of(np.concatenate(joined, axis=-2), empty.box)
 
 
 def scaled(points: Array, box: Array) -> Array:

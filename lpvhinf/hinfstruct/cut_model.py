@@ -41,7 +41,7 @@ class CutModel:
         self.F = np.eye(n)
         self.straight_decrease = 0.0
         self._bent: list[int] = []
-        self._H = np.zeros((0, n, n))
+        self._H = self._room = np.zeros((0, n, n))
         self._gather()
 
     def _gather(self) -> None:
@@ -106,7 +106,7 @@ class CutModel:
         d = self.F @ found.step
         after = self.values + self.G @ d
         low, deciding = -(1.0 - WORTH) * found.decrease, -(1.0 + WORTH) * found.decrease
-        bends = 0.5 * (self._H @ found.step) @ found.step
+        bends = 0.5 * (self._H @ found.step) @ found.step if found.bends is None else found.bends
         reach = after + max(0.0, float(np.max(bends, initial=0.0)))
         near = ~self.hard & (self.values >= -max(depth, ACTIVE))
         straight = np.setdiff1d(np.flatnonzero(near & (reach > deciding)), self._bent)
@@ -114,7 +114,7 @@ class CutModel:
             H = self.oracle.hessians(self.point, [self.cuts[k] for k in straight])
             if H is None or not np.all(np.isfinite(H)):
                 return False
-            self._H = np.concatenate([self._H, self.F.T @ H @ self.F])
+            self._add(self.F.T @ H @ self.F)
             self._bent += [int(k) for k in straight]
         members = (family.best(d) for family in self._families(np.flatnonzero(~self.hard)))
         new = [cut for cut in members if cut.value - self.point.value + cut.gradient @ d > low]
@@ -122,6 +122,14 @@ class CutModel:
         new = [cut for cut in new if cut.value - self.point.value + cut.gradient @ d > self._family_top(cut, after)]
         self._join(new)
         return bool(straight.size or new)
+
+    def _add(self, H: Array) -> None:
+        """Append Hessians (k, n, n); the room doubles, as copying all of them each time costs more than using them."""
+        count, size = len(self._H), len(self._H) + len(H)
+        if size > len(self._room):
+            self._room = np.concatenate([self._H, np.empty((size, *H.shape[1:]))])
+        self._room[count:size] = H
+        self._H = self._room[:size]
 
     def _family_top(self, member: Cut, after: Array) -> float:
         """The highest value after the step of the cuts of the same family, with a margin for round-off."""

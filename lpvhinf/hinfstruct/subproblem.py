@@ -18,11 +18,12 @@ ROUNDS = 6
 
 @dataclass(slots=True, eq=False)
 class Subproblem:
-    """Step, multipliers of the soft cuts (they sum to one) and predicted decrease."""
+    """Step, multipliers of the soft cuts (they sum to one), predicted decrease, and d^T H_i d / 2 of bent cuts."""
 
     step: Array
     multipliers: Array
     decrease: float
+    bends: Array | None = None
 
 
 def quadratic_model(
@@ -200,4 +201,4 @@ def curved_step(
         d, Hd, now, height = d + t * found.step, Hd + t * Hs, trial, new
         if gained < 0.05 * (base - height):
             break
-    return Subproblem(d, weights, base - height) if height < base else None
+    return Subproblem(d, weights, base - height, 0.5 * (Hd @ d)) if height < base else None
