@@ -27,7 +27,7 @@ EFFORT = 8500.0
 POLISH_COST, POLISH_COST_EACH = 10.0, 0.8
 #: With limited effort the best start is polished on by so many iterations as long as they gain this part of the norm,
 #: up to this multiple of the effort.
-CHUNK, GAIN, LONGEST = 50, 1e-3, 4.0
+CHUNK, GAIN, LONGEST = 50, 1e-3, 3.0
 #: Chunks without such a gain, all but the first begun anew, after which other starts have their turn.
 STALLS = 2
 #: Ends within this of each other are the same minimum; so many starts must agree on the best one.
