@@ -156,6 +156,7 @@ def notes(report: dict[str, Any]) -> list[str]:
         "are over positions.",
         "Gains held: K_RB, L and xi of the design with the first Q; gamma at its design positions, unbounded where a "
         "loop there is not stable.",
+        "Mode peak: 0 dB is the static error of the plant's own modal input; not comparable between plants.",
         "gamma over P comes from a search, not from a proof. The designs stop after few iterations: differences of "
         "some percent are the optimiser's.",
     ]

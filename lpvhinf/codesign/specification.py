@@ -77,7 +77,7 @@ class Specification:
     delay_order: int = 2
     n_notches: int = 0
     order_K_RB: int | None = None
-    schedule: Mapping[str, int] = field(default_factory=dict)
+    schedule: Mapping[str, int] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
         for name in ("integral_ratio", "roll_off_ratio", "alpha", "K_s", "K_r", "beta_1", "beta_2", "Q"):

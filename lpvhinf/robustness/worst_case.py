@@ -14,8 +14,7 @@ from lpvhinf.robustness.outcomes import BETTER, FIGURES, Analysis, Outcomes
 from lpvhinf.robustness.samples import Samples
 
 DIFFERENCE = 1e-4  # of a coordinate of the unit cube, for slopes
-FIRST_STEP, LAST_STEP = 0.2, 1e-3  # of every coordinate
-SHRINKS = np.array([1.0, 0.5, 0.25, 0.1])  # steps that are tried at once
+GAIN = 1e-4  # relative improvement that is worth another start
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -60,16 +59,13 @@ def worst_case(
     max_evaluations: int = 1500,
     progress: Progress = SILENT,
 ) -> WorstCase:
-    r"""Search perturbations and position together for the worst value of a figure.
+    """Search perturbations and position together for the worst value of a figure.
 
-    From each of the worst plants of a Monte Carlo run, f is linearised by differences in the unit cube, and all
-    coordinates go by the same step into the direction that makes f worse, the best answer of
-
-    .. math:: \max_d\ \nabla f^\top d, \quad |d_i| \le \Delta, \quad u + d \in [0, 1]^n,
-
-    or by steps in proportion to the slope. :math:`\Delta` doubles after a success and shrinks after a failure. Figures
-    are a maximum over poles, modes or frequencies: where two of them meet, f has a kink that points away from a
-    maximum, which a search for one may ignore. The value is a lower bound of the worst case, not a certificate.
+    From each of the worst plants of a Monte Carlo run, a quasi-Newton method with bounds (L-BFGS-B) climbs in the unit
+    cube, with slopes by differences, and is started anew where it stops as long as that helps. Figures are a
+    maximum over poles, modes or frequencies: where two of them meet, they have a kink that points away from a maximum,
+    and most maxima lie at bounds, so that the method does well without smoothness. (The pole that counts for
+    `damping` may change: a jump.) The value is a lower bound of the worst case, not a certificate.
 
     Parameters
     ----------
@@ -116,54 +112,61 @@ def worst_case(
     )
 
 
+class _Enough(Exception):
+    """The evaluations are used up, or the value is infinite."""
+
+
 class _Objective:
-    """A figure over the unit cube, with the sign that makes more of it worse."""
+    """A figure over the unit cube, with the sign that makes more of it worse; it keeps the worst point seen."""
 
     def __init__(self, result: MonteCarlo, figure: str) -> None:
         self.analysis = Analysis(result.subject, result.uncertainty)
-        self.figure, self.evaluations = figure, 0
+        self.figure, self.evaluations, self.limit = figure, 0, 0
+        self.scale = 1.0
 
     def samples(self, unit: Array) -> Samples:
+        """The plants of points (N, dimension)."""
         return self.analysis.uncertainty.samples(self.analysis.subject.plant, unit)
 
-    def __call__(self, unit: Array) -> Array:
+    def start(self, x: Array, max_evaluations: int) -> None:
+        """Begin an ascent at a point."""
+        self.limit = self.evaluations + max_evaluations
+        self.point, self.value = x, -np.inf
+        self.value = float(self._values(x[None])[0])
+        self.scale = max(abs(self.value), np.finfo(float).tiny) if np.isfinite(self.value) else 1.0
+
+    def falling(self, x: Array) -> tuple[float, Array]:
+        """What a minimiser wants: minus the value and its slope, by one-sided differences into the cube."""
+        if not np.isfinite(self.value):
+            raise _Enough
+        sign = np.where(x + DIFFERENCE <= 1.0, 1.0, -1.0)
+        values = self._values(np.vstack([x, x + DIFFERENCE * np.diag(sign)]))
+        if not np.all(np.isfinite(values)):
+            raise _Enough
+        slope = sign * (values[1:] - values[0]) / DIFFERENCE
+        return -float(values[0]) / self.scale, -slope / self.scale
+
+    def _values(self, unit: Array) -> Array:
+        if self.evaluations + len(unit) > self.limit:
+            raise _Enough
         self.evaluations += len(unit)
-        return -BETTER[self.figure] * self.analysis.measure(self.samples(unit), [self.figure]).figure(self.figure)
+        values = -BETTER[self.figure] * self.analysis.measure(self.samples(unit), [self.figure]).figure(self.figure)
+        best = int(np.argmax(values))
+        if values[best] > self.value:
+            self.point, self.value = unit[best], float(values[best])
+        return np.asarray(values)
 
 
 def _ascend(objective: _Objective, start: Array, max_evaluations: int) -> tuple[Array, float]:
-    """A local maximum over the unit cube, and its value; infinity ends the search."""
-    x, limit, step = start, objective.evaluations + max_evaluations, FIRST_STEP
-    value = float(objective(x[None])[0])
-    while step >= LAST_STEP and np.isfinite(value) and objective.evaluations + len(x) < limit:
-        slope = _slope(objective, x, value)
-        while step >= LAST_STEP and objective.evaluations < limit:
-            # the corner of the trust region, and the gradient, which leaves alone what matters little
-            directions = np.stack([np.sign(slope), _gradient(slope)])
-            moves = (step * SHRINKS[:, None, None] * directions).reshape(-1, len(x))
-            trials = np.clip(x + moves, 0.0, 1.0)
-            found = objective(trials)
-            best = int(np.argmax(found))
-            used = step * SHRINKS[best // len(directions)]
-            if found[best] > value:
-                x, value, step = trials[best], float(found[best]), min(1.0, 2.0 * used)
-                break
-            step *= 0.5 * SHRINKS[-1]
-    return x, value
+    """The worst point that ascents from `start` find, and its value; infinity ends the search."""
+    from scipy.optimize import minimize
 
-
-def _gradient(slope: Array) -> Array:
-    """The slope with the largest entry scaled to one; where some are infinite, only those."""
-    if np.any(np.isinf(slope)):
-        return np.where(np.isinf(slope), np.sign(slope), 0.0)
-    size = float(np.max(np.abs(slope), initial=0.0))
-    return slope / size if size > 0.0 else slope
-
-
-def _slope(objective: _Objective, x: Array, value: float) -> Array:
-    """One-sided differences into the cube."""
-    sign = np.where(x + DIFFERENCE <= 1.0, 1.0, -1.0)
-    points = x + DIFFERENCE * np.diag(sign)
-    with np.errstate(invalid="ignore"):
-        change = sign * (objective(points) - value)
-    return np.nan_to_num(change, nan=0.0, posinf=np.inf, neginf=-np.inf)
+    objective.start(start, max_evaluations)
+    before = -np.inf
+    try:
+        while objective.value > before + GAIN * objective.scale:
+            before = objective.value
+            minimize(objective.falling, objective.point, jac=True, method="L-BFGS-B", bounds=[(0.0, 1.0)] * len(start))
+    except _Enough:
+        pass
+    return objective.point, objective.value
