@@ -15,6 +15,7 @@ READY := $(VENV)/.installed
 # The tests run in this many processes; each keeps to one thread.
 JOBS ?= 2
 STUDY := results/output_observer
+ERROR := results/error_observer
 PLANT := results/plant
 PIP_TOOLS := 7.6.2
 
@@ -34,8 +35,18 @@ reproduce: $(READY) ## the studies of the plant and of the paper, with their fig
 	$(PY) -m paper_figures --from $(PLANT) --out $(PLANT)/figures
 	$(PY) -m studies run output_observer --preset paper --out $(STUDY)
 	$(PY) -m paper_figures --from $(STUDY) --out $(STUDY)/figures
+	$(PY) -m studies run error_observer --preset paper --out $(ERROR)
+	$(PY) -m paper_figures --from $(ERROR) --out $(ERROR)/figures
+	$(PY) -m studies run feedforward --preset paper --out results/feedforward
+	$(PY) -m paper_figures --from results/feedforward --out results/feedforward/figures
+	$(PY) -m studies.claims --from results --out results/claims
 
-reproduce-all: reproduce bench ## the above and the benchmarks
+reproduce-all: reproduce bench ## the above, more modes, bandwidths and seeds, fully actuated plants, and the benchmarks
+	$(PY) -m studies run error_observer --preset full --out $(ERROR)
+	$(PY) -m paper_figures --from $(ERROR) --out $(ERROR)/figures
+	$(PY) -m studies run full_actuation --preset paper --out results/full_actuation
+	$(PY) -m paper_figures --from results/full_actuation --out results/full_actuation/figures
+	$(PY) -m studies.claims --from results --out results/claims
 
 test: $(READY) ## the tests of a few minutes
 	$(PY) -m pytest -n $(JOBS) --dist loadfile -m "not slow"

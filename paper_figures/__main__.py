@@ -12,22 +12,30 @@ from lpvhinf.cli.exit_status import exit_status
 from lpvhinf.errors import DomainError
 from paper_figures import (
     damping_trade,
+    feedforward_excitation,
+    feedforward_steps,
+    full_actuation_band_pass,
     plant_coil_currents,
     plant_frf,
     plant_modal_gains,
     plant_mode_shapes,
     plant_top_view,
     six_block,
+    trade_off,
+    two_by_two,
 )
 from studies.results import of_the_study
 
 # The figures of each study; a results folder says in settings.json which study it comes from.
 FIGURES: dict[str, dict[str, Any]] = {
     "output_observer": {module.NAME: module for module in (six_block, damping_trade)},
+    "error_observer": {module.NAME: module for module in (two_by_two, trade_off)},
     "plant": {
         module.NAME: module
         for module in (plant_top_view, plant_mode_shapes, plant_modal_gains, plant_coil_currents, plant_frf)
     },
+    "feedforward": {module.NAME: module for module in (feedforward_excitation, feedforward_steps)},
+    "full_actuation": {full_actuation_band_pass.NAME: full_actuation_band_pass},
 }
 
 

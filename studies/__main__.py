@@ -10,11 +10,17 @@ from typing import Any
 
 from lpvhinf.cli.exit_status import exit_status
 from lpvhinf.cli.terminal import TerminalProgress
-from studies import output_observer, plant
+from studies import error_observer, feedforward, full_actuation, output_observer, plant
 from studies.results import of_the_study
 from studies.settings import load_settings
 
-STUDIES: dict[str, Any] = {output_observer.NAME: output_observer, plant.NAME: plant}
+STUDIES: dict[str, Any] = {
+    output_observer.NAME: output_observer,
+    error_observer.NAME: error_observer,
+    plant.NAME: plant,
+    feedforward.NAME: feedforward,
+    full_actuation.NAME: full_actuation,
+}
 
 
 def parser() -> argparse.ArgumentParser:
@@ -24,7 +30,7 @@ def parser() -> argparse.ArgumentParser:
     commands.add_parser("list", help="name the studies and their presets")
     run = commands.add_parser("run", help="run a study; what is finished in the folder is kept")
     run.add_argument("name", choices=sorted(STUDIES))
-    run.add_argument("--preset", default="paper", help="tiny, paper, or the path of a .toml file")
+    run.add_argument("--preset", default="paper", help="tiny, paper, where there is one full, or a .toml file")
     run.add_argument("--out", type=Path, help="results folder, default results/NAME")
     run.add_argument("--jobs", type=int, help="processes, default as in the preset")
     report = commands.add_parser("report", help="write the report of a results folder anew")

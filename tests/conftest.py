@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -85,19 +86,32 @@ def small_positions() -> Array:
 
 @pytest.fixture(scope="session")
 def tiny_results(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The results folder of the study output_observer, preset tiny: most of a minute, once for all workers.
+    """The results folder of the study output_observer, preset tiny: most of a minute, once for all workers."""
+    from studies import output_observer
 
-    The first worker that wants it runs the study, others wait for it: their folders have a common parent.
+    return tiny_run(output_observer, tmp_path_factory)
+
+
+@pytest.fixture(scope="session")
+def tiny_error_results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same of the study error_observer: half a minute."""
+    from studies import error_observer
+
+    return tiny_run(error_observer, tmp_path_factory)
+
+
+def tiny_run(study: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Run a study's preset tiny, in a folder below the parent that the folders of all workers have in common.
+
+    The first worker that wants it runs the study, others wait for it.
     """
     from lpvhinf.progress import SILENT
-    from studies import output_observer
     from studies.settings import load_settings
 
     own = tmp_path_factory.getbasetemp()
-    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "tiny"
+    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / study.NAME
     with folder.with_suffix(".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # until the file is closed
         if not (folder / "report.json").is_file():
-            settings = load_settings(output_observer.Settings, output_observer.NAME, "tiny")
-            output_observer.run(settings, folder, SILENT)
+            study.run(load_settings(study.Settings, study.NAME, "tiny"), folder, SILENT)
     return folder

@@ -43,6 +43,7 @@ FLOORS = {
     "shaping": 3,
     "problems": 4,
     "codesign": 5,
+    "robustness": 5,
     "simulation": 5,
     "plotting": 6,
     "cli": 7,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections.abc import Callable, Sequence
 
@@ -9,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lpvhinf.checks import Array, finite_array, points_in_box, positive, read_only, whole_number
-from lpvhinf.codesign.assembly import ARCHITECTURES, Assembly
+from lpvhinf.codesign.assembly import ARCHITECTURES, ERROR_OBSERVER, RIGID_BODY, Assembly
 from lpvhinf.codesign.design import Design
+from lpvhinf.codesign.error_based import check_error_based
 from lpvhinf.codesign.positions import design_positions, plant_family
 from lpvhinf.codesign.specification import Specification
 from lpvhinf.codesign.starts import observer_starts, rigid_starts
@@ -39,6 +41,7 @@ def codesign(
     architecture: str = "output-observer",
     specification: Specification | None = None,
     *,
+    problem: str | None = None,
     positions: ArrayLike | None = None,
     n_positions: int = 13,
     warm_start: Design | ArrayLike | None = None,
@@ -57,6 +60,9 @@ def codesign(
 ) -> Design:
     r"""Minimise the largest :math:`\|M(p)\|_\infty` over P with the structure diag(K_RB, L, xi).
 
+    A design with scheduled gains (`Specification.schedule`) begins with the one of constant gains, unless it has a
+    `warm_start`.
+
     The norm counts at a set of design positions, with the plant model itself. Positions found to be
     worse join the set, positions that do not matter leave it if it grows beyond 15, and the design goes on,
     until none is worse by `exchange_tolerance`. If the rounds run out the best of them counts.
@@ -65,9 +71,13 @@ def codesign(
     ----------
     decoupled : DecoupledPlant
         From `decouple`.
-    architecture : "rigid-body" or "output-observer"
-        The conventional 4-block design of K_RB, or the 6-block design with the output-based modal observer.
+    architecture : "rigid-body", "output-observer" or "error-observer"
+        The conventional design of K_RB, or a co-design with the output-based or the error-based modal observer.
     specification : Specification
+    problem : "six-block" or "two-by-two", optional
+        The paper's problem for the output-based observer, whose first four blocks are that of the conventional
+        design, or the one for the error-based observer, whose left column is that of the conventional design. By
+        default the one of the architecture; compare designs under one problem, or by `column_norms`.
     positions : (N, n_p), optional
         Design positions; default the corners of P and an even spread, `n_positions` in all.
     warm_start : Design or (n_theta,), optional
@@ -98,15 +108,23 @@ def codesign(
     Raises
     ------
     DomainError
-        If the architecture is unknown, a position lies outside of P, or a number is out of its range.
+        If the architecture or the problem is unknown, a position lies outside of P, or a number is out of its range.
+    AssumptionError
+        If a mode that an error-based observer is to estimate is not observable at some position.
     SynthesisError
         If no stabilising parameters are found.
+
+    Warns
+    -----
+    LpvHinfWarning
+        If a bandwidth reaches a mode that nobody controls, or a feedforward of the known model leaves rigid-body
+        motion in the error, which an error-based observer takes for motion of the modes.
     """
     began = time.monotonic()
     spec = Specification() if specification is None else specification
     if architecture not in ARCHITECTURES:
         raise DomainError(f"architecture is {architecture!r}, wanted one of {', '.join(ARCHITECTURES)}.")
-    if architecture != "rigid-body" and decoupled.n_flex == 0:
+    if architecture != RIGID_BODY and decoupled.n_flex == 0:
         raise DomainError("n_flex is 0, wanted at least 1 preserved flexible mode for an observer design.")
     for name, value, least in (
         ("n_positions", n_positions, 1),
@@ -120,7 +138,9 @@ def codesign(
         whole_number(name, value, least)
     positive("exchange_tolerance", exchange_tolerance)
     spec.warn_if_demanding(decoupled)
-    assembly = Assembly(plant=decoupled, specification=spec, architecture=architecture)
+    assembly = Assembly(plant=decoupled, specification=spec, architecture=architecture, problem_name=problem)
+    if architecture == ERROR_OBSERVER:
+        check_error_based(assembly)
     active = (
         design_positions(decoupled.box, n_positions, seed=seed)
         if positions is None
@@ -128,11 +148,20 @@ def codesign(
     )
 
     own: Design | None = None
-    if architecture == "output-observer" and warm_start is None and rigid_start is None:
+    if assembly.layout.scheduled and warm_start is None:
+        # the same with constant gains first: what it finds is a start, and its positions are those that count
         warm_start = own = codesign(
-            decoupled, "rigid-body", spec, positions=active[:WARM_POSITIONS], starts=1, exchange_rounds=0, n_search=1,
-            seed=seed, max_iterations=max_iterations, tolerance=max(tolerance, WARM_TOLERANCE),
-            time_limit=time_limit, progress=progress,
+            decoupled, architecture, dataclasses.replace(spec, schedule={}), problem=problem, positions=active,
+            rigid_start=rigid_start, starts=starts, exchange_rounds=exchange_rounds,
+            exchange_tolerance=exchange_tolerance, n_search=n_search, max_iterations=max_iterations,
+            tolerance=tolerance, time_limit=time_limit, seed=seed, jobs=jobs, progress=progress,
+        )  # fmt: skip
+        active = own.positions
+    if architecture != RIGID_BODY and warm_start is None and rigid_start is None:
+        warm_start = own = codesign(
+            decoupled, RIGID_BODY, spec, problem=assembly.problem_name, positions=active[:WARM_POSITIONS], starts=1,
+            exchange_rounds=0, n_search=1, seed=seed, max_iterations=max_iterations,
+            tolerance=max(tolerance, WARM_TOLERANCE), time_limit=time_limit, progress=progress,
         )  # fmt: skip
     begin = _initial(assembly, active, warm_start, rigid_start, starts)
     progress.stage(f"{architecture}: {len(active)} positions, {assembly.structure.n_parameters} parameters")
@@ -145,6 +174,7 @@ def codesign(
         return hinfstruct(
             plants,
             assembly.structure,
+            points=points if assembly.layout.scheduled else None,
             initial=begin if initial is None else list(initial),
             starts=0,
             seed=seed,
@@ -207,7 +237,9 @@ def _initial(
     if rigid_start is None:
         return rigid_starts(assembly, starts)
     rigid = finite_array("rigid_start", rigid_start, (assembly.rigid_body.n_parameters,))
-    return [rigid] if assembly.observer is None else observer_starts(assembly, active, rigid, starts)
+    if assembly.observer is None:
+        return [assembly.layout.expanded(rigid)]
+    return observer_starts(assembly, active, rigid, starts)
 
 
 def _translated(assembly: Assembly, design: Design) -> Array:

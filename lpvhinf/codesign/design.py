@@ -10,12 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from lpvhinf.checks import Array
+from lpvhinf.checks import Array, points_in_box
 from lpvhinf.codesign.assembly import Assembly
+from lpvhinf.codesign.physical import PhysicalGains, physical_gains
 from lpvhinf.codesign.specification import Specification
-from lpvhinf.controllers import RigidBodyGains, RigidBodyStateSpace, band_pass, velocity_selection
+from lpvhinf.controllers import RigidBodyGains, RigidBodyStateSpace, band_pass
 from lpvhinf.controllers.rigid_body import PARAMETERS
 from lpvhinf.hinfstruct import Evaluations
+from lpvhinf.problems import SIX_BLOCK
 from lpvhinf.problems.wiring import Wiring
 from lpvhinf.statespace.lpv import LPVStateSpace
 from lpvhinf.storage import write_arrays
@@ -63,8 +65,14 @@ class Design:
 
     @property
     def architecture(self) -> str:
-        """The architecture: "rigid-body" or "output-observer"."""
+        """The architecture: "rigid-body", "output-observer" or "error-observer"."""
         return self.assembly.architecture
+
+    @property
+    def problem(self) -> str:
+        """The problem that it was tuned for: "six-block" (4-block without observer) or "two-by-two"."""
+        assert self.assembly.problem_name is not None
+        return self.assembly.problem_name
 
     @property
     def specification(self) -> Specification:
@@ -81,36 +89,39 @@ class Design:
         """Whether every loop at a design position is Hurwitz."""
         return bool(np.all(np.isfinite(self.gammas)))
 
-    @cached_property
-    def K_RB(self) -> RigidBodyGains | RigidBodyStateSpace:
-        """The rigid-body controller in physical units: gains of PIDs and notches, or a state space per axis."""
-        return self.assembly.rigid_body.gains(self.assembly.split(self.parameters)[0])
+    def gains_at(self, p: Array) -> PhysicalGains:
+        """The tuned gains in physical units at a position (n_p,), the same everywhere unless they are scheduled."""
+        return physical_gains(self.assembly, self.parameters, points_in_box(p, self.assembly.plant.box)[0])
 
     @cached_property
+    def _central(self) -> PhysicalGains:
+        return physical_gains(self.assembly, self.parameters)
+
+    @property
+    def K_RB(self) -> RigidBodyGains | RigidBodyStateSpace:
+        """The rigid-body controller in physical units: gains of PIDs and notches, or a state space per axis.
+
+        Where it is scheduled, at the centre of P; so are L and xi. Elsewhere: `gains_at`.
+        """
+        return self._central.K_RB
+
+    @property
     def L(self) -> Array | None:
         """The observer gain (n_o, n_out), from innovations [m, rad] to physical modal states; None without observer."""
-        observer, scaling = self.assembly.observer, self.assembly.scaling
-        if observer is None:
-            return None
-        L = self.assembly.split(self.parameters)[1]
-        unit = scaling.state[: len(L)] * observer.injection
-        return np.asarray(unit[:, None] * L * scaling.output)
+        return self._central.L
 
-    @cached_property
+    @property
     def xi(self) -> Array | None:
         """Gains of K_FM, (n_flex,) [N/sqrt(kg) per m sqrt(kg)/s = 1/s]; positive damps."""
-        if self.assembly.observer is None:
-            return None
-        scaling, n_rb, n_flex = self.assembly.scaling, self.assembly.plant.n_rb, self.assembly.plant.n_flex
-        velocity = scaling.state[2 * n_rb + 1 : 2 * (n_rb + n_flex) : 2]
-        return np.asarray(self.assembly.split(self.parameters)[2] * scaling.input[n_rb:] / velocity)
+        return self._central.xi
 
     @cached_property
     def controller(self) -> LPVStateSpace:
         """The controller from (e, y) [m, rad] to (u_RB, u_FM) [m/s^2, rad/s^2, N/sqrt(kg)].
 
-        e = r - y_RB; the observer is fed with all outputs y = (y_RB, redundant readings) and the controller's own
-        outputs.
+        e = r - y_RB. The output-based observer is fed with all outputs y = (y_RB, redundant readings) and the
+        controller's own outputs; the error-based one with -e, the redundant readings and u_FM, so that y_RB acts on
+        nothing: e is then what is left of the error behind the feedforward.
         """
         assembly, tuned = self.assembly, self.assembly.tuned_parts(self.parameters)
         n_rb, scaling, observer = assembly.plant.n_rb, assembly.scaling, assembly.observer
@@ -123,15 +134,15 @@ class Design:
         u_RB = wiring.drive("K_RB", tuned.K_RB, wiring.stack(e, wiring.state("integral")))
         outputs = [np.diag(scaling.input[:n_rb]) @ u_RB]
         if observer is not None:
+            assert tuned.L is not None
             x, model = wiring.state("observer"), observer.model
-            estimates = velocity_selection(n_rb, observer.n_flex) @ x
-            u_FM = -np.diag(np.asarray(tuned.xi)) @ wiring.drive(
-                "band_pass", band_pass(observer.omega, observer.Q), estimates
-            )
-            u = wiring.stack(u_RB, u_FM)
-            innovation = y - model.C @ x - model.D @ u
-            gain = observer.injection[:, None] * np.asarray(tuned.L)
-            wiring.set_derivative("observer", model.A @ x + model.B @ u + gain @ innovation)
+            velocities = wiring.drive("band_pass", band_pass(observer.omega, observer.Q), observer.Psi @ x)
+            u_FM = -(tuned.K_FM @ velocities)
+            u, measured = wiring.stack(u_RB, u_FM), y
+            if observer.fed_by_error:
+                u, measured = u_FM, wiring.stack(-e, y[slice(n_rb, None), slice(None)])
+            correction = tuned.L @ (measured - model.C @ x - model.D @ u)
+            wiring.set_derivative("observer", model.A @ x + model.B @ u + np.diag(observer.injection) @ correction)
             outputs.append(np.diag(scaling.input[n_rb:]) @ u_FM)
         return wiring.read(outputs)
 
@@ -139,8 +150,9 @@ class Design:
     def closed_loop(self) -> LPVStateSpace:
         """The unweighted loop in physical units, polynomial in p.
 
-        Inputs: an output disturbance w1 [m, rad], an acceleration w2 at u_RB [m/s^2, rad/s^2] that the observer
-        sees, a modal force w3 [N/sqrt(kg)]; outputs: e [m, rad], u_RB [m/s^2, rad/s^2], u_FM [N/sqrt(kg)].
+        Inputs, whatever the problem: an output disturbance w1 [m, rad], an acceleration w2 at u_RB [m/s^2, rad/s^2]
+        that the output-based observer sees, a modal force w3 [N/sqrt(kg)]; outputs: e [m, rad], u_RB [m/s^2,
+        rad/s^2], u_FM [N/sqrt(kg)].
         """
         scaling, n_rb = self.assembly.scaling, self.assembly.plant.n_rb
         loop = self.assembly.loop.wire(
@@ -159,18 +171,26 @@ class Design:
             controller=self.assembly.tuned_parts(self.parameters),
             weighted=True,
             flexible_input=self.assembly.observer is not None,
+            problem=self.problem,
         )
 
-    def frozen(self, points: Array, *, weighted: bool = False) -> list[tuple[Array, Array, Array, Array]]:
+    def frozen(
+        self, points: Array, *, weighted: bool = False, problem: str | None = None
+    ) -> list[tuple[Array, Array, Array, Array]]:
         """Closed loops (A, B, C, D), scaled units, with the plant model itself at positions (N, n_p).
 
-        Inputs are (w1, w2, w3), outputs (e, u_RB, u_FM), or (z1, z2) if `weighted`.
+        Without filters the inputs are (w1, w2, w3) of the six blocks, the outputs (e, u_RB, u_FM). If `weighted` they
+        are w, with the force on the modes as its last part in every architecture, and (z1, z2) of a problem, by
+        default the one that the design was tuned for.
         """
-        tuned = self.assembly.tuned_parts(self.parameters)
+        if problem is None:
+            problem = self.problem if weighted else SIX_BLOCK
         centre = np.mean(self.assembly.plant.box, axis=1)[None]
         out = []
-        for loop in self.assembly.frozen_loops(points):
-            A, B, C, D = loop.wire(controller=tuned, weighted=weighted, flexible_input=True).sample(centre)
+        for p, loop in zip(points, self.assembly.frozen_loops(points), strict=True):
+            tuned = self.assembly.tuned_parts(self.parameters, p)
+            system = loop.wire(controller=tuned, weighted=weighted, flexible_input=True, problem=problem)
+            A, B, C, D = system.sample(centre)
             out.append((A[0], B[0], C[0], D[0]))
         return out
 
@@ -190,6 +210,7 @@ class Design:
             "exact_norms": self.evaluations.exact,
             "every_model_norms": self.evaluations.every_model,
             "architecture": np.array(self.architecture),
+            "problem": np.array(self.problem),
             "f_bw": self.assembly.scaling.f_bw,
             "scaling_output": self.assembly.scaling.output,
             "scaling_input": self.assembly.scaling.input,
@@ -200,7 +221,8 @@ class Design:
             arrays["K_RB"] = np.stack([parts.pop(name) for name in PARAMETERS])
         arrays |= {f"K_RB_{name}": value for name, value in parts.items()}  # notches, or state spaces
         if self.L is not None and self.xi is not None:
-            arrays |= {"L": self.L, "xi": self.xi}
+            arrays |= {"L": self.L, "xi": self.xi}  # at the centre of P where scheduled, as K_RB is
+        arrays |= {f"schedule_{name}": degree for name, degree in self.assembly.layout.degrees.items()}
         self.assembly.plant.system.save(folder / "plant.npz")
         self.controller.save(folder / "controller.npz")
         self.closed_loop.save(folder / "closed_loop.npz")
@@ -212,7 +234,8 @@ class Design:
         f_bw = self.assembly.scaling.f_bw
         names = AXES if len(f_bw) == len(AXES) else tuple(f"axis {i + 1}" for i in range(len(f_bw)))
         lines = [
-            f"{self.architecture} design for {np.unique(f_bw).tolist()} Hz at {len(self.positions)} positions",
+            f"{self.architecture} design for {np.unique(f_bw).tolist()} Hz at {len(self.positions)} positions, "
+            f"{self.problem} problem",
             f"  gamma            {self.gamma:.3f} at the design positions, {self.gamma_worst:.3f} over P (searched)",
             f"  worst position   {(1e3 * self.worst_position).round(1).tolist()} mm",
             *self.K_RB.table(names),
@@ -220,6 +243,9 @@ class Design:
         if self.xi is not None:
             pairs = zip(self.assembly.omega_flex, self.xi, strict=True)
             lines += [f"  mode {w / (2 * np.pi):.1f} Hz: xi = {xi:.1f} 1/s" for w, xi in pairs]
+        if degrees := self.assembly.layout.degrees:
+            moving = ", ".join(f"{name} of degree {degree}" for name, degree in degrees.items())
+            lines.append(f"  polynomials of p: {moving}; the values above are those at the centre of P")
         return "\n".join(lines)
 
     def __repr__(self) -> str:

@@ -58,8 +58,9 @@ def plant_family(assembly: Assembly) -> FrozenFamily:
 
 def norms_at(assembly: Assembly, theta: Array, points: Array) -> Array:
     """Exact norms of M with the plant model itself at positions (N, n_p); infinity where the loop is unstable."""
-    gain = assembly.structure.realize(theta)
-    return np.array([hinf_norm(*plant.close(*gain)).norm for plant in assembly.generalized_plants(points)])
+    plants = assembly.generalized_plants(points)
+    gains = [assembly.structure.realize(theta, p) for p in points]
+    return np.array([hinf_norm(*plant.close(*gain)).norm for plant, gain in zip(plants, gains, strict=True)])
 
 
 def worst_position(

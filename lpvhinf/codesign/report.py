@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from lpvhinf.codesign.complexity import complexity
 from lpvhinf.codesign.design import Design
 from lpvhinf.codesign.measures import Measures
 
@@ -21,6 +22,7 @@ def figures(design: Design, measures: Measures) -> dict[str, Any]:
     worst_own = int(np.argmax(np.max(measures.mode_peak, axis=1, initial=0.0)))
     return {
         "architecture": design.architecture,
+        "problem": design.problem,
         "gamma": design.gamma,
         "gamma_worst": design.gamma_worst,
         "worst_position_mm": 1e3 * design.worst_position,
@@ -42,4 +44,5 @@ def figures(design: Design, measures: Measures) -> dict[str, Any]:
         "K_RB": design.K_RB.arrays(),
         "xi": design.xi,
         "controller_states": design.controller.n_x,
+        "multiplications": complexity(design).multiplications,
     }

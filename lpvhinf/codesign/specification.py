@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from lpvhinf.errors import DomainError, LpvHinfWarning
 from lpvhinf.shaping import ShapingFilters
 
 Number = float | Sequence[float]
+TUNED = ("K_RB", "L", "xi")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,12 +46,15 @@ class Specification:
         Notches in series with each PID of K_RB; 0 as in the paper.
     order_K_RB : int, optional
         States per axis of a K_RB of free order, its integrator not counted, in place of the paper's PID.
+    schedule : mapping of str to int
+        Tuned parts, of "K_RB", "L" and "xi", that are polynomials of p, with their total degrees: {"L": 1}. None as
+        in the paper. K_RB's polynomials are those of the logarithms of a PID's parameters.
 
     Raises
     ------
     DomainError
         If a value is not finite and above zero (delay: not below zero), an option is unknown, n_notches is below 0,
-        order_K_RB below 2, or both are given.
+        order_K_RB below 2, or both are given, or the schedule names another part or a degree below 1.
 
     Examples
     --------
@@ -73,6 +77,7 @@ class Specification:
     delay_order: int = 2
     n_notches: int = 0
     order_K_RB: int | None = None
+    schedule: Mapping[str, int] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
         for name in ("integral_ratio", "roll_off_ratio", "alpha", "K_s", "K_r", "beta_1", "beta_2", "Q"):
@@ -95,6 +100,15 @@ class Specification:
                     f"n_notches is {self.n_notches} and order_K_RB is {self.order_K_RB}, wanted only one of them. "
                     "A notch is worth two states of a free order: leave n_notches out."
                 )
+
+        known_options("Specification(schedule)", self.schedule, TUNED)
+        for name, degree in self.schedule.items():
+            whole_number(f"schedule[{name!r}]", degree, 1)
+        if "K_RB" in self.schedule and self.order_K_RB is not None:
+            raise DomainError(
+                f"schedule has K_RB and order_K_RB is {self.order_K_RB}, wanted only one of them: matrices of free "
+                "order are no logarithms. Schedule the PID."
+            )
 
     @classmethod
     def from_mapping(cls, settings: dict[str, Any]) -> Specification:

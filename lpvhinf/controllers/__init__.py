@@ -1,5 +1,7 @@
 """The controllers of the paper: K_RB, K_FM and the modal observer."""
 
+from lpvhinf.controllers.error_observer import check_observable as check_observable
+from lpvhinf.controllers.error_observer import error_observer_model as error_observer_model
 from lpvhinf.controllers.flexible import band_pass as band_pass
 from lpvhinf.controllers.flexible import velocity_selection as velocity_selection
 from lpvhinf.controllers.free_rigid_body import FreeRigidBodyStructure as FreeRigidBodyStructure

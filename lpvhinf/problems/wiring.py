@@ -19,6 +19,7 @@ from lpvhinf.polynomial import ChebyshevMatrix, block
 from lpvhinf.statespace.lpv import LPVStateSpace
 
 Signal = ChebyshevMatrix
+Gain = Array | ChebyshevMatrix
 
 
 class Wiring:
@@ -76,7 +77,7 @@ class Wiring:
         """Say what the time derivative of a state is."""
         self._derivatives[name] = signal
 
-    def drive(self, name: str, system: tuple[Array, Array, Array, Array], source: Signal) -> Signal:
+    def drive(self, name: str, system: tuple[Gain, Gain, Gain, Gain], source: Signal) -> Signal:
         """Drive a system (A, B, C, D), whose state is `name`, by `source`; returns its output signal."""
         A, B, C, D = system
         x = self.state(name)

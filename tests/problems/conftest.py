@@ -43,11 +43,12 @@ def random_tuned(assembly: Assembly, seed: int = 0, size: float = 1.0) -> Tuned:
     """Any parameters, stabilising or not."""
     rng = np.random.default_rng(seed)
     n_rb, n_flex, n_out = assembly.plant.n_rb, assembly.plant.n_flex, assembly.plant.n_out
+    n_o = 2 * (n_flex if assembly.architecture == "error-observer" else n_rb + n_flex)
     f = assembly.specification.bandwidths(n_rb)
     centre = {"k": 0.3 + 0 * f, "f_i": f / 5, "f_d": f / 3, "f_lp": 4 * f, "zeta": 0.7 + 0 * f}
     return Tuned(
         rigid={name: value * np.exp(0.2 * rng.standard_normal(n_rb)) for name, value in centre.items()},
-        L=size * rng.standard_normal((2 * (n_rb + n_flex), n_out)),
+        L=size * rng.standard_normal((n_o, n_out)),
         xi=size * rng.uniform(0.2, 0.6, n_flex),
     )
 
@@ -135,6 +136,76 @@ class Reference:
         x = s / (2 * np.pi * f_lp)
         return np.diag(k * (1 + 2 * np.pi * f_i / s) * (1 + s / (2 * np.pi * f_d)) / (x**2 + 2 * zeta * x + 1))
 
+    def error_observer(self, s: complex, L: Array) -> tuple[Complex, Complex]:
+        """O(s) from u_FM and from (y_flex, y_red) to the modal velocities, in physical states and scaled at the end."""
+        plant, branch = self.assembly.plant, self.assembly.observer
+        assert branch is not None
+        n_rb, n_flex = plant.n_rb, plant.n_flex
+        A, B, C = (
+            np.zeros((2 * n_flex, 2 * n_flex)),
+            np.zeros((2 * n_flex, n_flex)),
+            np.zeros((plant.n_out, 2 * n_flex)),
+        )
+        for i in range(n_flex):
+            w, z = plant.omega[n_rb + i], plant.zeta[n_rb + i]
+            A[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = [[0.0, 1.0], [-(w**2), -2 * z * w]]
+            B[2 * i + 1, i] = 1.0
+            C[:, 2 * i] = self.C_o[:, i]
+        state = self.assembly.scaling.state[2 * n_rb : 2 * (n_rb + n_flex)]
+        gain = state[:, None] * branch.injection[:, None] * L / self.errors  # physical L
+        inverse = np.linalg.inv(s * np.eye(2 * n_flex) - A + gain @ C)[1::2]
+        from_u = inverse @ (B - gain @ self.D_o[:, n_rb:]) * self.assembly.scaling.input[n_rb:]
+        from_y = inverse @ gain * self.errors
+        return from_u / state[1::2, None], from_y / state[1::2, None]
+
+    def by_error(self, s: complex, tuned: Tuned) -> tuple[Complex, Complex, Complex]:
+        """G_Delta from u_1 and u_2 to the controlled outputs, redundant readings closed over the observer, and Sigma.
+
+        u_FM = Sigma e with e = -y_flex, and velocities that the force opposes.
+        """
+        plant, K_FM = self.assembly.plant, self.K_FM(s, tuned)
+        n_rb, one = plant.n_rb, np.eye(plant.n_flex)
+        G, (O_u, O_y) = self.plant(s), self.error_observer(s, tuned.L)
+        G_1, G_2, R_1, R_2 = G[:n_rb, :n_rb], G[:n_rb, n_rb:], G[n_rb:, :n_rb], G[n_rb:, n_rb:]
+        O_e, O_r = -O_y[:, :n_rb], O_y[:, n_rb:]
+        Sigma = -np.linalg.solve(one + K_FM @ O_u, K_FM @ O_e)
+        of_redundant = -np.linalg.solve(one + K_FM @ O_u, K_FM @ O_r)
+        closed = np.linalg.inv(one - of_redundant @ R_2)
+        return G_1 + G_2 @ closed @ of_redundant @ R_1, G_2 @ closed, Sigma
+
+    def two_by_two_weights(self, s: complex) -> tuple[Complex, Complex, Complex]:
+        """W_z1, W_w1, W_w2 of the 2x2 problem; W_z2 = I."""
+        W_z1, roll_off, modes = self.weights(s)
+        K_r = self.assembly.specification.K_r
+        return W_z1 / K_r, roll_off, K_r * modes
+
+    def loops(self, s: complex, tuned: Tuned) -> tuple[Complex, Complex, Complex]:
+        """S~, and G_Delta from u_1 and from u_2, of any architecture."""
+        n_rb, K = self.assembly.plant.n_rb, self.K_RB(s, tuned)
+        if self.assembly.architecture == "error-observer":
+            G_1, G_2, Sigma = self.by_error(s, tuned)
+            return np.linalg.inv(np.eye(n_rb) + G_1 @ K + G_2 @ Sigma), G_1, G_2
+        if self.assembly.architecture == "output-observer":
+            G_1, G_2, _, _ = self.augmented(s, tuned)
+        else:
+            G = self.plant(s)[:n_rb]
+            G_1, G_2 = G[:, :n_rb], G[:, n_rb:]
+        return np.linalg.inv(np.eye(n_rb) + G_1 @ K), G_1, G_2
+
+    def two_by_two(self, s: complex, tuned: Tuned) -> Complex:
+        """The paper's M with 2x2 blocks."""
+        W_z1, W_w1, W_w2 = self.two_by_two_weights(s)
+        S, G_1, G_2 = self.loops(s, tuned)
+        K, left, right = self.K_RB(s, tuned), G_1 @ W_w1, G_2 @ W_w2
+        return np.asarray(np.block([[W_z1 @ S @ left, W_z1 @ S @ right], [K @ S @ left, K @ S @ right]]))
+
+    def six_blocks(self, s: complex, tuned: Tuned) -> Complex:
+        """M with 6 blocks, of any architecture."""
+        W_z1, W_z2, W_w3 = self.weights(s)
+        S, G_1, G_2 = self.loops(s, tuned)
+        columns = np.hstack([np.eye(len(S)), G_1, G_2 @ W_w3])
+        return np.asarray(np.vstack([W_z1 @ S @ columns, W_z2 @ self.K_RB(s, tuned) @ S @ columns]))
+
     def weights(self, s: complex) -> tuple[Complex, Complex, Complex]:
         """W_z1, W_z2, W_w3 of eq. 16-18."""
         wanted, plant = self.assembly.specification, self.assembly.plant
@@ -185,7 +256,7 @@ Make = Callable[..., Assembly]
 def assemble(small_modal: ModalModel, mmpa: MMPA) -> Make:
     """Assemblies of the small plant or the benchmark, kept for all tests."""
     plants: dict[tuple[str, int, str], DecoupledPlant] = {}
-    made: dict[tuple[str, int, float, str, str], Assembly] = {}
+    made: dict[tuple[str, int, float, str, str, str | None], Assembly] = {}
 
     def make(
         name: str,
@@ -194,15 +265,18 @@ def assemble(small_modal: ModalModel, mmpa: MMPA) -> Make:
         delay: float = 0.0,
         sensing: str = "all",
         architecture: str = "output-observer",
+        problem: str | None = None,
     ) -> Assembly:
-        which, key = (name, n_flex, sensing), (name, n_flex, delay, sensing, architecture)
+        which, key = (name, n_flex, sensing), (name, n_flex, delay, sensing, architecture, problem)
         if which not in plants:
             source, degree = (small_modal, 12) if name == "small" else (mmpa, 8)
             plants[which] = decouple(source, n_flex=n_flex, sensing=sensing, degree=degree)
         if key not in made:
             settings: dict[str, Any] = vars(SMALL if name == "small" else BENCHMARK)
             wanted = Specification(**{**settings, "delay": delay})
-            made[key] = Assembly(plant=plants[which], specification=wanted, architecture=architecture)
+            made[key] = Assembly(
+                plant=plants[which], specification=wanted, architecture=architecture, problem_name=problem
+            )
         return made[key]
 
     return make

@@ -11,7 +11,7 @@ import lpvhinf
 from lpvhinf.cli.main import main as console
 from lpvhinf.cli.main import read_specification
 from studies import output_observer
-from studies.__main__ import main
+from studies.__main__ import STUDIES, main
 from studies.settings import PRESETS, load_settings
 
 TINY = (PRESETS / "output_observer_tiny.toml").read_text("utf-8")
@@ -36,7 +36,8 @@ def run_with(text: str, tmp_path: Path, *options: str) -> int:
 def test_list_names_the_studies(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["list"]) == 0
     lines = dict(line.split(": ", 1) for line in capsys.readouterr().out.splitlines())
-    assert set(lines) == {output_observer.NAME, "plant"}
+    assert set(lines) == set(STUDIES)
+    assert {"output_observer", "error_observer", "plant"} <= set(lines)
     assert "6-block" in lines[output_observer.NAME]
 
 
@@ -116,7 +117,7 @@ def test_a_report_of_nothing(capsys: pytest.CaptureFixture[str], tmp_path: Path)
     assert "settings.json cannot be read as JSON" in capsys.readouterr().err
     (tmp_path / "settings.json").write_text("{}", encoding="utf-8")
     assert main(["report", str(tmp_path)]) == 1
-    assert "names the study None, wanted one of output_observer, plant" in capsys.readouterr().err
+    assert f"names the study None, wanted one of {', '.join(STUDIES)}" in capsys.readouterr().err
     (tmp_path / "settings.json").write_text('{"study": "output_observer"}', encoding="utf-8")
     assert main(["report", str(tmp_path)]) == 1
     assert "designs.json cannot be read as JSON" in capsys.readouterr().err

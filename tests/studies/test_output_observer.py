@@ -17,7 +17,7 @@ from lpvhinf.decoupling import DecoupledPlant
 from lpvhinf.hinfstruct import hinf_norm
 from lpvhinf.statespace import LPVStateSpace
 from lpvhinf.storage import read_arrays, read_json
-from studies import output_observer
+from studies import codesign_folder, output_observer
 from studies.output_observer import Job, Settings, jobs_of
 
 DESIGNS = ("conventional", "conventional-rigid", "observer")
@@ -40,11 +40,11 @@ class Stored:
 
     @cached_property
     def measures(self) -> dict[str, Any]:
-        return read_arrays(self.folder / "measures.npz", output_observer.MEASURES)
+        return read_arrays(self.folder / "measures.npz", codesign_folder.MEASURES)
 
     @cached_property
     def responses(self) -> dict[str, Any]:
-        return read_arrays(self.folder / "responses.npz", output_observer.RESPONSES)
+        return read_arrays(self.folder / "responses.npz", codesign_folder.RESPONSES)
 
     @cached_property
     def summary(self) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from lpvhinf.checks import Array
 from lpvhinf.errors import StorageError
 from lpvhinf.progress import SILENT, Progress
 from lpvhinf.storage import read_arrays, read_json, write_arrays, write_json
-from studies import output_observer
+from studies import codesign_folder, output_observer
 from studies.output_observer import Job, Settings, jobs_of, key_of, run, run_design
 from studies.output_observer_report import write_report
 
@@ -95,7 +95,7 @@ def stamps(folder: Path) -> dict[str, int]:
 
 
 def save_always(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(output_observer, "SAVE_EVERY", 0.0)
+    monkeypatch.setattr(codesign_folder, "SAVE_EVERY", 0.0)
 
 
 def test_an_interrupt_leaves_finished_designs_and_no_report(finished: Path) -> None:
@@ -127,7 +127,7 @@ def test_a_checkpoint_is_gone_on_from(tmp_path: Path, monkeypatch: pytest.Monkey
     with pytest.raises(KeyboardInterrupt):
         run_design(SMALLEST, CONVENTIONAL, tmp_path, Recorder("worst position"))
     folder = tmp_path / "designs" / CONVENTIONAL.name
-    left = read_arrays(folder / "checkpoint.npz", output_observer.CHECKPOINT)
+    left = read_arrays(folder / "checkpoint.npz", codesign_folder.CHECKPOINT)
     assert not (folder / "summary.json").exists()
     listener = Recorder()
     run_design(SMALLEST, CONVENTIONAL, tmp_path, listener)
