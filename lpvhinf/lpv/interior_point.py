@@ -23,7 +23,7 @@ from lpvhinf.checks import Array, positive, read_only, whole_number
 from lpvhinf.errors import AssumptionError
 from lpvhinf.lpv.cone import inner, inverse_factors, inverses, longest_step, moved
 from lpvhinf.lpv.farkas import ANY_LEVEL, certificate, lifted, without_gamma
-from lpvhinf.lpv.linear_solve import Factor, factored, refined
+from lpvhinf.lpv.linear_solve import REGULARISATION, Factor, factored, refined
 from lpvhinf.lpv.lmi import InfeasibilityCertificate, LMIProblem, LMISolution
 from lpvhinf.lpv.operator import LMIOperator
 from lpvhinf.lpv.schur import operator_form, schur_complement, symmetric
@@ -33,8 +33,8 @@ from lpvhinf.progress import SILENT, Progress
 
 #: Slacks that differ from F0 + F y by less than this share count as feasible.
 FEASIBLE = 1e-11
-#: Steps below this length, several times, end the iteration.
-SHORT = 1e-3
+#: Steps below this length, or solutions with a larger relative residual, three times in a row, end the iteration.
+SHORT, USELESS = 1e-3, 1e-2
 #: Residuals of the multipliers below which the duality gap is taken for an estimate.
 CONSISTENT = 1e-6
 #: Corrections of a step after Mehrotra's, at most, for small and for large problems: each costs a solve with the factor
@@ -48,10 +48,16 @@ ACCURATE = 1e-10
 BOLDER = 0.4
 #: A further correction is kept if it leaves less than this share of what the one before left.
 WORTH = 0.98
+#: A residual of the multipliers that is left as it is.
+ROUND_OFF = 1e-12
+#: Points are checked beyond round-off once the gap is this multiple of the wanted one; before, this many are kept.
+NEAR, KEPT = 3.0, 4
 #: Problems with fewer variables run on one thread: below this a second one costs more than it brings.
 ONE_THREAD = 1500
-#: Refinement steps where the factor is exact and where it had to be regularised.
-REFINEMENTS = (4, 25)
+#: Above this the next factor is regularised more.
+INACCURATE = 1e-8
+#: Steps of refinement of a solution, at most.
+REFINEMENTS = 25
 
 
 @dataclass
@@ -172,6 +178,7 @@ class _Run:
         self.best: Array | None = None  # the point of least gamma that holds beyond round-off
         self.bound, self.estimate = -np.inf, -np.inf
         self.multipliers: list[Array] = []
+        self.pending: list[Array] = []  # feasible points that were not checked yet
         self.last = np.zeros(0)
         self.reason = ""
 
@@ -183,12 +190,23 @@ class _Run:
 
     def iterate(self) -> None:
         """Run until the gap is closed, or there is no going on."""
+        self._iterate()
+        for y in reversed(self.pending):  # points that were not looked at on the way
+            if self.best is None:
+                self.improve(y)
+        for y in self.pending[-1:]:
+            self.improve(y)
+
+    def _iterate(self) -> None:
         now = Iterate(*starting_point(self.operator), exact=False)
         self.reason, short = "the limit of iterations was reached", 0
         for _ in range(self.max_iterations):
             mu = inner(now.X, now.Z) / self.degree
             residual_Z, off = self.record(now, mu)
-            if self.closed() <= self.gap:
+            if self.best is not None and self.best[-1] < self.until < np.inf:
+                self.reason = "the bound that was asked for cannot be reached"
+                return
+            if self.until == np.inf and self.closed() <= self.gap:
                 self.reason = "the gap is closed"
                 return
             if self.bound > self.until:
@@ -201,9 +219,9 @@ class _Run:
             if following is None:
                 self.reason = why
                 return
-            short = short + 1 if length < SHORT else 0
+            short = short + 1 if length < SHORT or self.history[-1]["error"] > USELESS else 0
             if short == 3:
-                self.reason = "steps became too short"
+                self.reason = "round-off left no step"
                 return
             now = following
 
@@ -220,12 +238,18 @@ class _Run:
         if residual_X <= CONSISTENT and off <= FEASIBLE:
             self.estimate = max(self.estimate, gamma - mu * self.degree)
         self.estimate = max(self.estimate, self.bound)
+        open_gap = (gamma - self.estimate) / max(abs(gamma), 1e-12)
         if off <= FEASIBLE:
-            self.improve(now.y)
+            self.pending.append(now.y)
+            if open_gap <= NEAR * self.gap:
+                for y in self.pending[-3:]:
+                    self.improve(y)
+                self.pending.clear()
+            del self.pending[:-KEPT]
         self.history.append(
-            {"gamma": gamma, "bound": bound, "mu": mu, "gap": self.closed(), "off_Z": off, "off_X": residual_X}
+            {"gamma": gamma, "bound": bound, "mu": mu, "gap": open_gap, "off_Z": off, "off_X": residual_X}
         )
-        self.progress.update(gamma=gamma, gap=self.closed())
+        self.progress.update(gamma=gamma, gap=open_gap)
         return residual_Z, off
 
     def improve(self, y: Array) -> None:
@@ -246,11 +270,12 @@ class _Run:
         factor = factored(lambda H: schur_complement(self.operator, now.X, W, H), self.H, self.level)
         if factor is None:
             return None, 0.0, "the Schur complement could not be factored"
-        self.level = max(0, factor.level - 1)
         system = _System(self.operator, now, W, residual_Z, self.goal, factor)
-        chosen, along_X, along_Z, centring = self.mehrotra(system, now, L_X, L_Z, mu)
+        chosen, along_X, along_Z, centring, error = self.mehrotra(system, now, L_X, L_Z, mu)
+        # a factor of a matrix that is singular to round-off may succeed and be worth less than a regularised one
+        self.level = min(factor.level + 1, len(REGULARISATION) - 1) if error > INACCURATE else max(0, factor.level - 1)
         self.history[-1].update(
-            along_X=along_X, along_Z=along_Z, centring=centring, error=chosen.error, level=float(factor.level)
+            along_X=along_X, along_Z=along_Z, centring=centring, error=error, level=float(factor.level)
         )
         y = now.y + along_Z * chosen.dy
         Z, exact = moved(now.Z, along_Z, chosen.dZ), now.exact
@@ -263,36 +288,39 @@ class _Run:
 
     def mehrotra(
         self, system: _System, now: Iterate, L_X: list[Array], L_Z: list[Array], mu: float
-    ) -> tuple[Direction, float, float, float]:
-        """Mehrotra's step, corrected further where that pays, its lengths in X and in Z, and its centring."""
+    ) -> tuple[Direction, float, float, float, float]:
+        """Mehrotra's step, corrected further where that pays, its lengths in X and Z, its centring and the error."""
         plain = system.plain()
-        along_X, along_Z = lengths(L_X, L_Z, plain)
+        along_X, along_Z = (min(1.0, along) for along in lengths(L_X, L_Z, plain))
         aimed = inner(moved(now.X, along_X, plain.dX), moved(now.Z, along_Z, plain.dZ)) / self.degree
         second, centre = system.second_order(plain), system.centring()
         centring = min(1.0, max(1e-3, (max(aimed, 0.0) / mu) ** max(1.0, 2.0 * min(along_X, along_Z) ** 2)))
         if min(along_X, along_Z) < 0.1:
             centring = max(centring, 0.5)
         chosen = combination(plain, (1.0, second), (centring * mu, centre))
-        shorter = min(lengths(L_X, L_Z, chosen))
+        to_X, to_Z = lengths(L_X, L_Z, chosen)
+        shorter = min(1.0, to_X, to_Z)
         for _ in range(
             CORRECTIONS[self.operator.n_variables >= LARGE]
         ):  # the second order of a better step, and a bolder target where there is room
             bolder = max(1e-3, BOLDER * centring) if shorter > 0.9 else centring
             trial = combination(plain, (1.0, system.second_order(chosen)), (bolder * mu, centre))
-            length = min(lengths(L_X, L_Z, trial))
+            trial_X, trial_Z = lengths(L_X, L_Z, trial)
+            length = min(1.0, trial_X, trial_Z)
             left, before = 1.0 - length * (1.0 - bolder), 1.0 - shorter * (1.0 - centring)
             if left >= WORTH * before or length < min(0.5, shorter):
                 break
-            chosen, shorter, centring = trial, length, bolder
-        chosen = system.corrected(chosen)
-        to_X, to_Z = longest_step(L_X, chosen.dX), longest_step(L_Z, chosen.dZ)
+            chosen, shorter, centring, to_X, to_Z = trial, length, bolder, trial_X, trial_Z
+        corrected = system.corrected(chosen)
+        if corrected is not chosen:
+            chosen, (to_X, to_Z) = corrected, lengths(L_X, L_Z, corrected)
         share = 0.9 + 0.07 * min(1.0, to_X, to_Z)
-        return chosen, min(1.0, share * to_X), min(1.0, share * to_Z), centring
+        return chosen, min(1.0, share * to_X), min(1.0, share * to_Z), centring, max(plain.error, second.error)
 
 
 def lengths(L_X: list[Array], L_Z: list[Array], step: Direction) -> tuple[float, float]:
-    """Step lengths, at most 1, to the boundaries of the cones."""
-    return min(1.0, longest_step(L_X, step.dX)), min(1.0, longest_step(L_Z, step.dZ))
+    """Step lengths to the boundaries of the cones."""
+    return longest_step(L_X, step.dX), longest_step(L_Z, step.dZ)
 
 
 def combination(first: Direction, *others: tuple[float, Direction]) -> Direction:
@@ -326,15 +354,16 @@ class _System:
         if self.accurate:
             dy, error = self.factor.solve(r), 0.0
         else:
-            steps = REFINEMENTS[min(self.factor.level, 1)]
-            dy, error = refined(self.factor, lambda v: operator_form(self.operator, self.X, self.W, v), r, steps)
+            dy, error, before = refined(
+                self.factor, lambda v: operator_form(self.operator, self.X, self.W, v), r, REFINEMENTS
+            )
+            self.accurate = self.factor.level == 0 and before <= ACCURATE
         return dy, self.operator.linear(dy), error
 
     def plain(self) -> Direction:
         """The step towards X Z = 0 that removes all residuals."""
         skewed = self.through(self.residual_Z)
         dy, linear, error = self.solved(-self.goal - self.operator.adjoint(skewed))
-        self.accurate = self.factor.level == 0 and error <= ACCURATE
         dZ = [symmetric(f + rest) for f, rest in zip(linear, self.residual_Z)]
         return Direction(dy, [-x - t for x, t in zip(self.X, self.through(dZ))], dZ, error)
 
@@ -351,13 +380,13 @@ class _System:
 
     def corrected(self, step: Direction) -> Direction:
         """The step with the residual that round-off leaves in F* (X + dX) removed, as far as round-off allows."""
-        best, least = step, np.inf
+        first, best, least = step, step, np.inf
         for _ in range(3):
             left = self.goal - self.operator.adjoint([x + d for x, d in zip(self.X, step.dX)])
             size = float(np.linalg.norm(left))
             if size < least:
                 best, least = step, size
-            if size <= 1e-13 or (size > 0.5 * least and step is not best):
+            if size <= ROUND_OFF or (size > 0.5 * least and step is not best):
                 break
             dy = self.factor.solve(left)
             linear = self.operator.linear(dy)
@@ -367,7 +396,7 @@ class _System:
                 [a - b for a, b in zip(step.dZ, linear)],
                 size,
             )
-        return Direction(best.dy, best.dX, best.dZ, least)
+        return first if best is first else Direction(best.dy, best.dX, best.dZ, least)
 
     def through(self, T: list[Array]) -> list[Array]:
         """Symmetric part of X T W."""

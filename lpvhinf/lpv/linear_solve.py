@@ -13,7 +13,9 @@ from lpvhinf.checks import Array
 #: What is added to the diagonal, scaled to 1, where the factorisation breaks down: first nothing.
 REGULARISATION = (0.0, 1e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8)
 #: Relative residual at which refinement stops.
-RESIDUAL = 1e-13
+RESIDUAL = 1e-12
+#: Steps in which the residual must have been halved.
+PATIENCE = 5
 #: Rows that are scaled at a time.
 ROWS = 256
 
@@ -74,7 +76,7 @@ def factored(assemble: Callable[[Array], None], H: Array, level: int = 0) -> Fac
 
 def refined(
     factor: Factor, apply: Callable[[Array], Array], r: Array, steps: int, residual: float = RESIDUAL
-) -> tuple[Array, float]:
+) -> tuple[Array, float, float]:
     """H d = r by conjugate gradients on the operator, preconditioned with the factor.
 
     Returns
@@ -83,14 +85,16 @@ def refined(
         The best iterate.
     error : float
         Its relative residual, in the scaled norm.
+    before : float
+        That of the factor alone.
     """
     d = factor.solve(r)
     size = float(np.linalg.norm(factor.scale * r))
     if size == 0.0:
-        return d, 0.0
+        return d, 0.0, 0.0
     left = r - apply(d)
     error = float(np.linalg.norm(factor.scale * left)) / size
-    best, least = d, error
+    best, least, errors = d, error, [error]
     z = factor.solve(left)
     direction, energy = z, float(left @ z)
     for _ in range(steps):
@@ -107,7 +111,10 @@ def refined(
             best, least = d, error
         elif error > 1e3 * least:
             break
+        errors.append(least)
+        if len(errors) > PATIENCE and least > 0.5 * errors[-1 - PATIENCE]:
+            break
         z = factor.solve(left)
         before, energy = energy, float(left @ z)
         direction = z + (energy / before) * direction
-    return best, least
+    return best, least, errors[0]
