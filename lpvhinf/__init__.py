@@ -44,6 +44,16 @@ from lpvhinf.hinfstruct import StaticGain as StaticGain
 from lpvhinf.hinfstruct import Sum as Sum
 from lpvhinf.hinfstruct import hinf_norm as hinf_norm
 from lpvhinf.hinfstruct import lower_bound as lower_bound
+from lpvhinf.lpv import AffineEmbedding as AffineEmbedding
+from lpvhinf.lpv import DiscreteController as DiscreteController
+from lpvhinf.lpv import LPVNormResult as LPVNormResult
+from lpvhinf.lpv import LPVSynthesisResult as LPVSynthesisResult
+from lpvhinf.lpv import ScheduledController as ScheduledController
+from lpvhinf.lpv import affine_embedding as affine_embedding
+from lpvhinf.lpv import discretise as discretise
+from lpvhinf.lpv import lpvnorm as lpvnorm
+from lpvhinf.lpv import lpvsyn as lpvsyn
+from lpvhinf.lpv import lpvsyn_statefeedback as lpvsyn_statefeedback
 from lpvhinf.plant import Actuator as Actuator
 from lpvhinf.plant import MechanicalModel as MechanicalModel
 from lpvhinf.plant import ModalModel as ModalModel
