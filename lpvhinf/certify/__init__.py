@@ -14,3 +14,5 @@ from lpvhinf.certify.claim import Refutation as Refutation
 from lpvhinf.certify.claim import Undecided as Undecided
 from lpvhinf.certify.engine import l2_gain as l2_gain
 from lpvhinf.certify.engine import stability as stability
+from lpvhinf.certify.global_lyapunov import GlobalLyapunov as GlobalLyapunov
+from lpvhinf.certify.global_lyapunov import constant_lyapunov as constant_lyapunov

@@ -78,10 +78,10 @@ class Floats:
         return Enclosure(list(place), terms, cls.grow(spread + rounding, 2))
 
     @classmethod
-    def expand(cls, c: Any, cell: Cell, degree: int, memory: dict[str, Any]) -> tuple[Any, Any]:
+    def expand(cls, c: Any, cell: Cell, degree: int, slopes: int, memory: dict[str, Any]) -> tuple[Any, Any]:
         """A Chebyshev series (k_1, ..., k_np, N) on the cell x_i = a_i + r_i delta_i, inside [-1, 1].
 
-        Coefficients of powers of delta (indices, N); bounds (1 + n_p, N) of the rest and of its derivatives to delta_i.
+        Coefficients of powers of delta (indices, N); bounds (1 + slopes, N) of the rest and of derivatives to delta_i.
         """
         n_p, shape, N, every = len(cell), c.shape[:-1], c.shape[-1], indices(len(cell), degree)
         maps = [restriction(a, r, k) for (a, r), k in zip(cell, shape)]
@@ -98,9 +98,9 @@ class Floats:
             rest[k] = zero
         terms, wrong = cls.combine(chebyshev_to_powers(n_p, degree), low)
         many, bounds = math.prod(shape), []
-        for axis in range(-1, n_p):
-            weights = 1 if axis < 0 else (np.indices(shape)[axis] ** 2).astype(cls.dtype)[..., None]
-            bound = cls.grow((rest * weights).reshape(many, N).sum(axis=0) + wrong * len(every) ** 2, many + 3)
+        for axis in range(-1, slopes):
+            left = rest if axis < 0 else rest * (np.indices(shape)[axis] ** 2).astype(cls.dtype)[..., None]
+            bound = cls.grow(left.reshape(many, N).sum(axis=0) + wrong * len(every) ** 2, many + 3)
             reach = math.prod(sums[int(i == axis)] for i, (_, sums) in enumerate(maps))
             rounding = cls.error(cls.grow(abs(c).reshape(many, N).sum(axis=0) * reach, many), sum(shape) + 8 * n_p)
             small = cls.error(zero, (n_p + 1) * many * reach)  # every coefficient and every step, in absolute terms
@@ -222,7 +222,7 @@ def loop(F: type[Floats], it: Mapping[str, Any], cell: Cell, memory: dict[str, A
         shape, entries = it[f"{name}_shape"], it[f"{name}_entries"]
         if name not in memory:
             memory[name] = {"c": F.take(it[f"{name}_coefficients"]).reshape(*shape[:-2], len(entries))}
-        values, bounds = F.expand(memory[name]["c"], maps, it["degree"], memory[name])
+        values, bounds = F.expand(memory[name]["c"], maps, it["degree"], 0, memory[name])
         i, j = row + entries // shape[-1], column + entries % shape[-1]
         terms[:, j, i] += values
         radius[j, i] += bounds[0]
@@ -241,7 +241,7 @@ def lyapunov(F: type[Floats], it: Mapping[str, Any], leaf: int, cell: Cell) -> t
     if start == 0:
         terms[1:, row, column] = terms[1:, column, row] = F.take(it["X"][leaf])
     else:
-        values, rest = F.expand(F.take(it["X"]), cell, it["lyapunov_degree"], {})
+        values, rest = F.expand(F.take(it["X"]), cell, it["lyapunov_degree"], n_p, {})
         terms[:, row, column] = terms[:, column, row] = values
         bounds[:, row, column] = bounds[:, column, row] = rest
     drifts, units = [], np.eye(n_p, dtype=int).tolist()

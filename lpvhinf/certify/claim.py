@@ -86,7 +86,7 @@ class Certificate:
         Their bounds in p.
     margins : (n_cells,)
         Margin of every cell.
-    cpu_time : [s]
+    cpu_time : [s] of this process
     """
 
     claim: Claim

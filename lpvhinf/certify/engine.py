@@ -9,22 +9,23 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lpvhinf.certify import arguments
-from lpvhinf.certify.cells import Point, grid_points, whole
+from lpvhinf.certify.cells import Point, grid_points
 from lpvhinf.certify.claim import Certificate, Claim, Refutation, Undecided
 from lpvhinf.certify.frozen import FrozenStability
 from lpvhinf.certify.global_lyapunov import GlobalLyapunov, GlobalProver, constant_lyapunov
 from lpvhinf.certify.l2_gain import gain_candidate
 from lpvhinf.certify.loop import LoopMatrix
 from lpvhinf.certify.outcome import nothing, outcome
+from lpvhinf.certify.parallel import search
 from lpvhinf.certify.quadratic import common_lyapunov
-from lpvhinf.certify.rate import rate_candidate
+from lpvhinf.certify.rate import LARGE, rate_candidate
 from lpvhinf.certify.refute import unstable_position
 from lpvhinf.certify.refute_gain import large_gain
 from lpvhinf.certify.refute_quadratic import excluded
-from lpvhinf.certify.search import DEEPEST, bisect
+from lpvhinf.certify.search import DEEPEST
 from lpvhinf.certify.system import L2_GAIN, STABILITY, CanonicalSystem, canonical_system
-from lpvhinf.checks import Array, finite_array
-from lpvhinf.errors import DomainError
+from lpvhinf.checks import Array, finite_array, whole_number
+from lpvhinf.errors import DimensionError, DomainError
 from lpvhinf.progress import SILENT, Progress
 from lpvhinf.statespace import LPVStateSpace
 
@@ -44,6 +45,7 @@ def stability(
     lyapunov_degree: int | None = None,
     lyapunov: GlobalLyapunov | None = None,
     time_limit: float | None = None,
+    jobs: int | None = None,
     progress: Progress = SILENT,
 ) -> Certificate | Refutation | Undecided:
     r"""Prove that x' = A(p) x is stable for every p of a box.
@@ -68,6 +70,8 @@ def stability(
     lyapunov : GlobalLyapunov
         A P(p) of your own for the kinds "quadratic" and "rate"; found automatically without it.
     time_limit : [s]
+    jobs : int
+        Processes over which the cells are shared; one by default. A script needs a main guard then.
 
     Returns
     -------
@@ -89,6 +93,7 @@ def stability(
     """
     deadline = None if time_limit is None else time.monotonic() + time_limit
     started = time.process_time()
+    processes = 1 if jobs is None else whole_number("jobs", jobs, 1)
     where = arguments.sub_box(box, system.box)
     arguments.known("kind", kind, arguments.KINDS)
     claim = Claim(
@@ -99,6 +104,7 @@ def stability(
         rate=arguments.rate_box(rate, kind, len(where)),
         remainder=arguments.remainder_kind(remainder, remainder_is),
     )
+    _fits(lyapunov, claim, system.n_x)
     canonical = canonical_system(system, STABILITY)
     bounds = arguments.remainder_bounds(remainder, canonical)
     loop = LoopMatrix(canonical, where, decay=claim.decay, remainder=bounds)
@@ -107,9 +113,9 @@ def stability(
     if kind == "frozen":
         d, e = _degrees(degree, lyapunov_degree, 4, 3)
         prover = FrozenStability(loop, d, e)
-        search = bisect(prover, [whole(len(where))], deadline=deadline, deepest=deepest, progress=progress)
-        refutation = _unstable(claim, canonical, [Point(cell.centre) for cell in search.suspects])
-        return refutation or outcome(claim, canonical, bounds, search, d, e, started)
+        found = search(prover, len(where), jobs=processes, deadline=deadline, deepest=deepest, progress=progress)
+        refutation = _unstable(claim, canonical, [Point(cell.centre) for cell in found.suspects])
+        return refutation or outcome(claim, canonical, bounds, found, d, e, started)
     d, e = _degrees(degree, lyapunov_degree, 5, 4)
     candidate = lyapunov
     if candidate is None and kind == "quadratic":
@@ -121,19 +127,19 @@ def stability(
         candidate = None if common is None else constant_lyapunov(common.P, len(where))
     elif candidate is None:
         assert claim.rate is not None
-        found = rate_candidate(system, where, claim.decay, np.max(np.abs(claim.rate), axis=1))
-        candidate = None if found is None else found[0]
+        suggested = rate_candidate(system, where, claim.decay, np.max(np.abs(claim.rate), axis=1))
+        candidate = None if suggested is None else suggested[0]
     if candidate is None:
         refutation = _unstable(claim, canonical, _least_stable(system, where, claim.decay))
         return refutation or nothing(claim, "no Lyapunov matrix was found", started)
     moving = GlobalProver(loop, candidate, d, e, claim.rate)
-    search = bisect(moving, [whole(len(where))], deadline=deadline, deepest=deepest, progress=progress)
-    if search.reason:
+    found = search(moving, len(where), jobs=processes, deadline=deadline, deepest=deepest, progress=progress)
+    if found.reason:
         refutation = _unstable(claim, canonical, _least_stable(system, where, claim.decay))
         if refutation is not None:
             return refutation
     stored = {"S": candidate.S, "X": candidate.X}
-    return outcome(claim, canonical, bounds, search, d, moving.lyapunov_degree, started, stored)
+    return outcome(claim, canonical, bounds, found, d, moving.lyapunov_degree, started, stored)
 
 
 def l2_gain(
@@ -149,6 +155,7 @@ def l2_gain(
     lyapunov_degree: int | None = None,
     lyapunov: GlobalLyapunov | None = None,
     time_limit: float | None = None,
+    jobs: int | None = None,
     progress: Progress = SILENT,
 ) -> Certificate | Refutation | Undecided:
     r"""Prove that the L2 gain from u to y is below gamma for every p of a box.
@@ -159,7 +166,7 @@ def l2_gain(
     Parameters
     ----------
     gamma : bound of the gain, above 0
-    kind, rate, box, degree, lyapunov_degree, lyapunov, time_limit
+    kind, rate, box, degree, lyapunov_degree, lyapunov, time_limit, jobs
         As for `stability`.
     remainder : {"A": ..., "B": ..., "C": ..., "D": ...}
         Entrywise bounds of what the polynomials leave out.
@@ -177,6 +184,7 @@ def l2_gain(
     """
     deadline = None if time_limit is None else time.monotonic() + time_limit
     started = time.process_time()
+    processes = 1 if jobs is None else whole_number("jobs", jobs, 1)
     where = arguments.sub_box(box, system.box)
     arguments.known("kind", kind, arguments.KINDS)
     bound = float(finite_array("gamma", gamma, ()))
@@ -190,6 +198,7 @@ def l2_gain(
         rate=arguments.rate_box(rate, kind, len(where)),
         remainder=arguments.remainder_kind(remainder, remainder_is),
     )
+    _fits(lyapunov, claim, system.n_x)
     canonical = canonical_system(system, L2_GAIN)
     bounds = arguments.remainder_bounds(remainder, canonical)
     progress.stage(str(claim))
@@ -197,7 +206,7 @@ def l2_gain(
     if refutation is not None:
         return refutation
     loop = LoopMatrix(canonical, where, gamma=bound, remainder=bounds)
-    d, e = _degrees(degree, lyapunov_degree, 5, 4)
+    d, e = _degrees(degree, lyapunov_degree, *((6, 6) if system.n_x > LARGE else (5, 4)))
     reach = np.zeros(len(where)) if claim.rate is None else np.max(np.abs(claim.rate), axis=1)
     candidate = lyapunov or gain_candidate(system, where, bound, reach, constant=kind == "quadratic")
     if candidate is None:
@@ -205,9 +214,27 @@ def l2_gain(
         return refutation or nothing(claim, "no Lyapunov matrix was found", started)
     prover = GlobalProver(loop, candidate, d, e, claim.rate)
     deepest = BOUNDED_DEEPEST if bounds else DEEPEST
-    search = bisect(prover, [whole(len(where))], deadline=deadline, deepest=deepest, progress=progress)
+    found = search(prover, len(where), jobs=processes, deadline=deadline, deepest=deepest, progress=progress)
     stored = {"S": candidate.S, "X": candidate.X}
-    return outcome(claim, canonical, bounds, search, d, prover.lyapunov_degree, started, stored)
+    return outcome(claim, canonical, bounds, found, d, prover.lyapunov_degree, started, stored)
+
+
+def _fits(lyapunov: GlobalLyapunov | None, claim: Claim, n: int) -> None:
+    """Errors for a system without states, or a Lyapunov matrix that cannot prove the claim."""
+    if n == 0:
+        raise DimensionError("the system has no states, wanted at least one: there is nothing to prove.")
+    if lyapunov is None:
+        return
+    if claim.property == STABILITY and claim.kind == "frozen":
+        raise DomainError("lyapunov is given, but kind is 'frozen'. Leave it out, or use kind='rate' or 'quadratic'.")
+    if claim.kind == "quadratic" and not lyapunov.is_constant:
+        raise DomainError("lyapunov depends on p, but kind is 'quadratic': wanted one matrix. Use kind='rate'.")
+    shape = (n, n), len(claim.box), n * (n + 1) // 2
+    if (lyapunov.S.shape, lyapunov.X.ndim - 1, lyapunov.X.shape[-1]) != shape:
+        raise DimensionError(
+            f"lyapunov has S {lyapunov.S.shape} and X {lyapunov.X.shape}, wanted S ({n}, {n}) and X with "
+            f"{len(claim.box)} axes of degrees and then {shape[2]} numbers."
+        )
 
 
 def _degrees(degree: int | None, lyapunov_degree: int | None, d: int, e: int) -> tuple[int, int]:

@@ -74,7 +74,9 @@ class GlobalProver:
         """Q on a cell."""
         n, m = self.loop.n_x, self.loop.size
         constant = self.lyapunov.is_constant
-        part = self.entries.local(cell.centre, cell.radius, self.lyapunov_degree, slopes=not constant)
+        part = self.entries.local(
+            cell.centre, cell.radius, self.lyapunov_degree, slopes=bool(np.any(self.vertices)) and not constant
+        )
         rows, cols = np.tril_indices(n)
         terms = np.zeros((len(part.terms), m, m))
         terms[:, rows, cols] = part.terms

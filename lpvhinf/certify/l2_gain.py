@@ -23,7 +23,6 @@ from lpvhinf.statespace import LPVStateSpace
 
 SLACK = 0.5  # share of the largest possible epsilon that is used
 STEPS = 10  # bisections for the largest epsilon
-NEWTON = 8  # steps from a neighbour's solution before the equation is solved afresh
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -64,25 +63,6 @@ def stabilizing(equation: Riccati) -> Array | None:
         return None
     X = 0.5 * (X + X.T)
     return X if _solves(equation, X) else None
-
-
-def refined(equation: Riccati, start: Array) -> Array | None:
-    """Newton's method (Kleinman) from a nearby solution; None where it does not settle."""
-    X = start
-    for _ in range(NEWTON):
-        closed = equation.A + equation.G @ X
-        try:
-            following = scipy.linalg.solve_continuous_lyapunov(closed.T, X @ equation.G @ X - equation.Q)
-        except np.linalg.LinAlgError:
-            return None
-        following = 0.5 * (following + following.T)
-        step = float(np.linalg.norm(following - X)) / max(float(np.linalg.norm(following)), 1e-300)
-        X = following
-        if not np.isfinite(step) or step > 10.0:
-            return None
-        if step < 1e-9:
-            return X if _solves(equation, X) else None
-    return None
 
 
 def _solves(equation: Riccati, X: Array) -> bool:
@@ -130,19 +110,15 @@ class BoundedReal:
         return True
 
     def values(self, points: Array) -> Array | None:
-        """P at positions (N, n_p), each from its neighbour's where that works."""
+        """P at positions (N, n_p)."""
         samples = self.system.sample(points)
         out = np.empty((len(points), self.system.n_x, self.system.n_x))
-        last: Array | None = None
         for k, p in enumerate(points):
             equation = self._equation([M[k] for M in samples], p, self.epsilon)
-            if equation is None:
-                return None
-            X = None if last is None else refined(equation, last)
-            X = stabilizing(equation) if X is None else X
+            X = None if equation is None else stabilizing(equation)
             if X is None:
                 return None
-            out[k] = last = X
+            out[k] = X
         return out
 
     def inequality(self, points: Array, P: Array) -> Array:
@@ -184,4 +160,4 @@ def gain_candidate(
     if constant:
         P = real.values(spread(box, 3, 0.97))
         return None if P is None else constant_lyapunov(P.mean(axis=0), len(box))
-    return fitted(box, real.values, real.inequality)
+    return fitted(box, real.values, real.inequality, first=45)

@@ -80,8 +80,7 @@ def normal_form(terms: Array, n_p: int, degree: int, e: int) -> LocalLyapunov | 
     D: Array = 1.0 / np.sqrt(-2.0 * lam.real)
     coupling = np.abs(S @ terms[1:] @ T).sum(axis=0)
     S = _balance(S, np.asarray(D[:, None] * coupling * D, dtype=float), lam)
-    T = np.linalg.inv(S)
-    H = S @ terms @ T
+    H = S @ terms @ np.linalg.inv(S)
     indices = {a: i for i, a in enumerate(multi_indices(n_p, degree))}
     wanted = multi_indices(n_p, e)
     X = np.zeros((len(wanted), n, n))
@@ -138,10 +137,10 @@ def _earlier(
         a = tuple(x - y for x, y in zip(b, c))
         if min(a) >= 0 and any(a) and a in indices:
             total += H[indices[a]].T @ X[k]
-    return total + total.T
+    return np.asarray(total + total.T)
 
 
 def _rounded(x: Array) -> Array:
     """To half precision, with entries too small to matter set to zero: the file stays small."""
-    half = np.where(np.abs(x) < 1e-6, 0.0, x).astype(np.float16)
-    return np.array(half, dtype=np.float64)
+    out: Array = np.where(np.abs(x) < 1e-6, 0.0, x).astype(np.float16).astype(np.float64)
+    return out

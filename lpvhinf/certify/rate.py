@@ -14,8 +14,9 @@ from lpvhinf.checks import Array
 from lpvhinf.polynomial import ChebyshevMatrix, from_nodes, nodes
 from lpvhinf.statespace import LPVStateSpace
 
-SIZES = (1, 3, 5, 9, 13, 21, 29, 37, 49, 65)  # Chebyshev points along every axis
+SIZES = (1, 3, 5, 9, 13, 21, 29, 37, 45, 49, 65)  # Chebyshev points along every axis
 MOST_POINTS = 2500
+LARGE = 30  # with more states than this, small numbers of points are not worth a try
 GOOD_FIT = 0.05  # largest error of the fitted inequality, relative to its weight
 ENOUGH = 2.0  # room for so many times the rates ends the search for a weight
 #: relative damping of a light mode, decay kept of the other block, positions per axis, width in half boxes
@@ -80,6 +81,7 @@ def fitted(
     box: Array,
     values: Callable[[Array], Array | None],
     inequality: Callable[[Array, Array], Array],
+    first: int = 21,
     good: float = GOOD_FIT,
 ) -> GlobalLyapunov | None:
     """The Lyapunov matrices `values`(points) as a polynomial of the least degree whose inequality is close enough.
@@ -87,6 +89,7 @@ def fitted(
     Parameters
     ----------
     inequality : (points, P) -> N (N_points, m, m), the matrix that is to be positive definite
+    first : number of points per axis to begin with where there are many states
     good : largest deviation of N, relative to itself
     """
     n_p = len(box)
@@ -105,6 +108,8 @@ def fitted(
     for size in SIZES:
         if size**n_p > MOST_POINTS:
             break
+        if size < first <= MOST_POINTS ** (1.0 / n_p) and wanted.shape[-1] > LARGE:
+            continue
         P = values(nodes((size,) * n_p, box))
         if P is None:
             return None

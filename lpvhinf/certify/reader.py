@@ -1,7 +1,6 @@
 """Read certificate files that nobody has to trust: docs/certificate_format.md, sections 1 to 3, 5 and 10.
 
-Sizes are known before anything is read, nothing is unpickled, and whatever is wrong ends as `NotACertificate`. Like the
-checker, it shares nothing with the engine.
+Sizes are known before anything is read, nothing is unpickled, what is wrong ends as `NotACertificate`. No engine here.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ import numpy as np
 MAX_BYTES, MAX_DIRECTORY, MAX_MEMBERS, MAX_HEADER = 2 * 10**9, 2**16, 40, 10**6
 MAX_SIZE, MAX_AXES, MAX_LENGTH, MAX_LEAVES, MAX_DEPTH = 400, 4, {"system": 129, "X": 65}, 200_000, 60
 MAX_COEFFICIENTS, MAX_NUMBERS = 2 * 10**7, 5 * 10**7  # of a polynomial matrix; of the largest array of a cell
-MAX_PRODUCTS, MAX_WORK = 10**11, 2 * 10**14  # multiplications of a cell, and of all cells
+MAX_PRODUCTS, MAX_WORK = 10**11, 2 * 10**13  # multiplications of a cell, and of all cells
 Path = str | os.PathLike[str]
 
 
@@ -242,9 +241,9 @@ def _certificate(members: Mapping[str, Any]) -> dict[str, Any]:
     demand(inside, "the box is not inside the system's box")
     names = "ABCD" if gain else "A"
     matrices = {name: polynomial(members, name, n_p) for name in names}
-    for name, (shape, _, c) in matrices.items():
-        same = canonical(*matrices[name])
-        demand(same[0] == shape and same[2].tobytes() == c.tobytes(), f"{name} is not in canonical form")
+    for name, parts in matrices.items():
+        shape, _, c = canonical(*parts)
+        demand(shape == parts[0] and c.tobytes() == parts[2].tobytes(), f"{name} is not in canonical form")
     demand(isinstance(stated, str) and stated == system_hash(system_box, matrices), "the system's hash does not fit")
     n = matrices["A"][0][-1]
     n_u, n_y = (matrices["B"][0][-1], matrices["C"][0][-2]) if gain else (0, 0)
@@ -282,6 +281,8 @@ def _certificate(members: Mapping[str, Any]) -> dict[str, Any]:
         demand(S.shape == (n, n) and fits and X.size <= MAX_COEFFICIENTS, "S or X have a wrong shape")
         demand(kind != "quadratic" or math.prod(lengths) == 1, "a quadratic claim needs one constant X")
     products = (math.comb(n_p + d, d) * math.comb(n_p + e, e) * 2 ** (n_p * (kind == "rate")) + (d + 1) ** n_p) * m**3
+    products += sum(c.size * sum(shape[:-2]) for shape, _, c in matrices.values())
+    products += X.size * sum(X.shape[:-1]) if layout == "global" else 0
     numbers = max(math.comb(n_p + d + e, n_p), (d + 1) ** n_p) * m**2
     bounded = products <= MAX_PRODUCTS and numbers <= MAX_NUMBERS and products * len(cells) <= MAX_WORK
     demand(bounded, "checking would take more memory or time than the limits allow")
@@ -289,9 +290,8 @@ def _certificate(members: Mapping[str, Any]) -> dict[str, Any]:
     out: dict[str, Any] = dict(members)
     out |= {"n": n, "m": m, "cells": cells, "rate": rates, "layout": layout, "degree": d, "lyapunov_degree": e}
     out |= {"decay": float(decay), "gamma": float(gamma) if gain else 0.0, "kind": kind, "remainder": remainder}
-    out |= {"box": _exact(box), "system_box": _exact(system_box), "system": stated, "matrices": names}
-    out["speeds"] = rate
-    out["blocks"] = [(name, (n + n_u) * (name in "CD"), n * (name in "BD")) for name in names]
+    out |= {"box": _exact(box), "system_box": _exact(system_box), "system": stated, "speeds": rate}
+    out["matrices"], out["blocks"] = names, [(name, (n + n_u) * (name in "CD"), n * (name in "BD")) for name in names]
     return out | {f"{name}_shape": shape for name, (shape, _, _) in matrices.items()}
 
 

@@ -41,7 +41,7 @@ def recheck(
     ----------
     path : the certificate
     exact : bool
-        Integers instead of floating point with bounds of its rounding; slower by a factor of about 40.
+        Integers instead of floating point with bounds of its rounding; slower by a factor of about 100.
     system : path, optional
         What `LPVStateSpace.save` wrote: the system that the claim has to speak of.
 

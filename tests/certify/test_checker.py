@@ -107,7 +107,7 @@ def test_local_expansion_encloses_the_series_and_its_derivatives(F: type[Floats]
     rng = np.random.default_rng(seed)
     c = rng.standard_normal((5, 7, 3)) * 0.5 ** np.add.outer(np.arange(5), np.arange(7))[..., None]
     cell = [(Fraction(1, 4), Fraction(1, 4)), (Fraction(-2, 3), Fraction(1, 3))]
-    terms, bounds = F.expand(F.take(c), cell, 3, {})
+    terms, bounds = F.expand(F.take(c), cell, 3, 2, {})
     terms, bounds = exactly(F, terms), exactly(F, bounds)
     assert np.all(bounds < 1.0)
 
@@ -468,6 +468,11 @@ def test_work_beyond_the_limits_is_refused(tmp_path: Path) -> None:
     found = verdict(tmp_path / "c.npz", members)
     assert found.status == 2
     assert "limits" in found.message
+    many = np.zeros((129, 129, 12, 12))  # a short file whose cells would cost a lot of time
+    many[-1, -1] = many[0, 0] = -1.0
+    tree = uniform(16, 2)
+    cells = certificate({"A": many}, np.eye(12), np.ones((1, 1, 78)), box=[[-1, 1]] * 2, tree=tree, degree=8)
+    assert "limits" in verdict(tmp_path / "c.npz", cells).message
 
 
 # the program

@@ -171,7 +171,7 @@ def test_gain_with_feedthrough_and_remainder() -> None:
     assert not isinstance(lh.certify.l2_gain(G, 1.80, remainder={"D": [[0.06]]}), Certificate)
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=15, deadline=None, derandomize=True)
 @given(st.integers(0, 10_000))
 def test_generated_systems_against_dense_sampling(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -247,3 +247,42 @@ def test_bad_arguments_are_named(options: dict[str, object], message: str) -> No
 def test_a_gain_must_be_above_zero(gamma: float) -> None:
     with pytest.raises(lh.DomainError, match="gamma"):
         lh.certify.l2_gain(spring(0.1), gamma)
+
+
+@pytest.mark.slow
+def test_processes_share_the_cells() -> None:
+    damping = np.zeros((3, 3))
+    damping[0, 0], damping[2, 0], damping[0, 2] = 2.0 + 1e-3, -1.0, -1.0
+    result = lh.certify.stability(oscillator(damping), jobs=2)
+    assert isinstance(result, Certificate)
+    assert np.prod(result.cells[..., 1] - result.cells[..., 0], axis=1).sum() == pytest.approx(4.0, rel=1e-12)
+
+
+def test_a_lyapunov_matrix_of_your_own() -> None:
+    P = np.array([[1.0, 0.2], [0.2, 1.0]])
+    own = lh.certify.constant_lyapunov(P, 1)
+    assert isinstance(lh.certify.stability(spring(0.3), kind="quadratic", lyapunov=own), Certificate)
+    assert not isinstance(lh.certify.stability(spring(0.5), kind="quadratic", lyapunov=own), Certificate)
+    with pytest.raises(lh.DomainError, match="kind is 'frozen'"):
+        lh.certify.stability(spring(0.3), lyapunov=own)
+    moving = lh.certify.GlobalLyapunov(S=own.S, X=np.concatenate([own.X, 0.1 * own.X]))
+    with pytest.raises(lh.DomainError, match="depends on p"):
+        lh.certify.stability(spring(0.3), kind="quadratic", lyapunov=moving)
+    with pytest.raises(lh.DimensionError, match="lyapunov has S"):
+        lh.certify.stability(spring(0.3), kind="quadratic", lyapunov=lh.certify.constant_lyapunov(np.eye(3), 1))
+
+
+def test_an_indefinite_matrix_proves_nothing() -> None:
+    # for an unstable A the Lyapunov inequality holds with a P that is not positive definite
+    G = autonomous([[1.0, 0.0], [0.0, -1.0]], [[-1.0, 1.0]])
+    X = np.array([[-1.0, 0.0, 1.0]])
+    own = lh.certify.GlobalLyapunov(S=np.eye(2), X=X)
+    assert isinstance(lh.certify.stability(G, kind="quadratic", lyapunov=own), Refutation)
+
+
+def test_a_system_without_states() -> None:
+    G = LPVStateSpace.from_coefficients(
+        np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[1.0]], box=[[-1.0, 1.0]]
+    )
+    with pytest.raises(lh.DimensionError, match="no states"):
+        lh.certify.stability(G)

@@ -48,8 +48,8 @@ def cells_certificate() -> Members:
 def planar_certificate() -> Members:
     """Frozen, two coordinates, on a part of the system's box."""
     A = planar(3)
-    part = frozen(A, uniform(4, 2), box=[[-1.0, 1.0], [-1.0, 1.0]], decay=0.05)
-    return resealed({**part, "box": part["box"] * 0.5})
+    part = frozen(A, uniform(3, 2), box=[[-1.0, 1.0], [-1.0, 1.0]], decay=0.05)
+    return resealed({**part, "box": part["box"] * 0.4})
 
 
 def quadratic_certificate() -> Members:
@@ -195,7 +195,7 @@ def sampled(m: Members) -> bool:
     """Whether the claim holds at many positions, frequencies and deviations within the remainder."""
     it = header(m)["claim"]
     n_p = len(m["box"])
-    axes = [np.linspace(low, high, 201 if n_p == 1 else 31) for low, high in m["box"]]
+    axes = [np.linspace(low, high, 101 if n_p == 1 else 25) for low, high in m["box"]]
     p = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, n_p)
     low, high = m["system_box"].T
     x = np.clip((2.0 * p - low - high) / (high - low), -1.0, 1.0)
@@ -207,7 +207,7 @@ def sampled(m: Members) -> bool:
         return False
     if it["property"] == "l2-gain":
         B, C, D = (value(tensor(m, name), x) for name in "BCD")
-        omega = np.linspace(0.0, 12.0, 241)
+        omega = np.linspace(0.0, 12.0, 121)
         inverse = np.linalg.inv(1j * omega[:, None, None, None] * np.eye(A.shape[-1]) - A[: len(x)])
         return bool(np.max(abs(C @ inverse @ B + D)) < it["gamma"])
     if it["kind"] == "frozen":
@@ -259,7 +259,7 @@ def test_what_is_accepted_is_true(tmp_path: Path, name: str) -> None:
         if found.proved:
             assert sampled(members), f"{name} {number} ({kind}) is accepted and false: {found.message}"
         count[kind, "accepted" if found.proved else "rejected"] += 1
-        if number % 10 == 0:  # the slow mode finds the same, up to its smaller round-off
+        if number % 18 == 0:  # the slow mode finds the same, up to its smaller round-off
             exact = recheck(tmp_path / "c.npz", exact=True)
             assert exact.status == found.status, f"{name} {number} ({kind}): {found.message}; exact: {exact.message}"
     # the test would be empty if nothing were rejected, or everything
@@ -276,7 +276,7 @@ def test_a_false_claim_is_never_accepted(tmp_path: Path, name: str) -> None:
         except np.linalg.LinAlgError:
             continue
         if false:
-            assert verdict(tmp_path / "c.npz", members).status == 1
+            assert not verdict(tmp_path / "c.npz", members).proved
             rejected += 1
     assert rejected >= 5
 
