@@ -13,6 +13,7 @@ Examples
 from lpvhinf.codesign import codesign as codesign  # noqa: I001
 from lpvhinf.hinfstruct import hinfstruct as hinfstruct
 
+from lpvhinf import certify as certify
 from lpvhinf.codesign import Design as Design
 from lpvhinf.codesign import Specification as Specification
 from lpvhinf.decoupling import DecoupledPlant as DecoupledPlant

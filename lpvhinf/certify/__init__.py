@@ -1,0 +1,18 @@
+"""Certificates: stability and performance proved for every p of a box, round-off included.
+
+Examples
+--------
+>>> import lpvhinf as lh
+>>> G = lh.LPVStateSpace.from_coefficients([[[-2.0]], [[1.0]]], [[1.0]], [[1.0]], [[0.0]], box=[[-1.0, 1.0]])
+>>> print(lh.certify.stability(G).claim)
+all eigenvalues have real part below 0 1/s at every frozen p, p in [-1, 1]
+"""
+
+from lpvhinf.certify.claim import Certificate as Certificate
+from lpvhinf.certify.claim import Claim as Claim
+from lpvhinf.certify.claim import Refutation as Refutation
+from lpvhinf.certify.claim import Undecided as Undecided
+from lpvhinf.certify.engine import l2_gain as l2_gain
+from lpvhinf.certify.engine import stability as stability
+from lpvhinf.certify.global_lyapunov import GlobalLyapunov as GlobalLyapunov
+from lpvhinf.certify.global_lyapunov import constant_lyapunov as constant_lyapunov
