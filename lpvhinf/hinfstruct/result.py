@@ -144,7 +144,10 @@ class HinfstructResult:
             ("parameters", str(self.parameters.size)),
             ("stabilizing", "yes" if self.stabilizing else "no"),
             ("optimality", f"{self.optimality:.2g}"),
-            *((f"constraint {i + 1}", str(value)) for i, value in enumerate(self.constraints)),
+            *(
+                (f"constraint {i + 1}", f"{goal.value:.6g}, {'holds' if goal.level <= 0.0 else 'fails'}")
+                for i, goal in enumerate(self.constraints)
+            ),
             ("status", self.status),
         ]
         return properties("HinfstructResult", values)

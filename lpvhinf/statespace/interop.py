@@ -87,8 +87,9 @@ def as_scipy(system: Any) -> Any:
 
     Examples
     --------
-    >>> as_scipy(([[-1.0]], [[1.0]], [[2.0]], [[0.0]])).to_tf().den
-    array([1., 1.])
+    >>> import control
+    >>> as_scipy(control.ss([[-1.0]], [[1.0]], [[2.0]], [[0.0]])).C
+    array([[2.]])
     """
     import scipy.signal
 
@@ -99,7 +100,9 @@ def as_scipy(system: Any) -> Any:
 def _matrices(system: Any) -> Matrices:
     if isinstance(system, tuple) and len(system) == 4:
         matrices: Any = system
-    elif hasattr(system, "A") and hasattr(system, "D") and not callable(getattr(system, "sample", None)):
+    elif hasattr(system, "box"):
+        raise DomainError(f"system is a {type(system).__name__}, which depends on p. Freeze it with system.at(p).")
+    elif hasattr(system, "A") and hasattr(system, "D"):
         matrices = (system.A, system.B, system.C, system.D)
     elif hasattr(system, "to_ss"):  # scipy.signal.lti in another form
         try:

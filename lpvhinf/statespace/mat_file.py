@@ -83,8 +83,8 @@ def read_mat(path: str | os.PathLike[str]) -> control.StateSpace | LPVStateSpace
                 system.dt = float(arrays["Ts"].ravel()[0])
             return system
     raise StorageError(
-        f"{path} has no variable {', '.join(missing)}. Wanted A, B, C, D (with box over P, with Ts in discrete time) or "
-        f"{', '.join(NAMES)}."
+        f"{path} has no variable {', '.join(missing)}. Wanted A, B, C, D (with box over P, with Ts in discrete time) "
+        f"or {', '.join(NAMES)}."
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,6 @@ from lpvhinf.statespace import (
     write_mat,
 )
 from lpvhinf.statespace.interop import sampled_matrices, state_space_matrices
-from tests.statespace.conftest import RandomSystem
 
 
 def value(matrices: tuple[Array, Array, Array, Array], s: complex) -> Array:
@@ -98,6 +98,8 @@ def test_matrices_that_do_not_fit() -> None:
         state_space_matrices((np.eye(2), np.ones((3, 1)), np.ones((1, 2)), [[0.0]]))
     with pytest.raises(DomainError, match="real"):
         state_space_matrices(np.array([[1.0 + 2.0j]]))
+    with pytest.raises(DomainError, match=r"Freeze it with system\.at"):
+        state_space_matrices(LPVStateSpace.from_system(2.0, [[0.0, 1.0]]))
     with pytest.raises(DomainError, match="finite"):
         state_space_matrices(([[np.inf]], [[1.0]], [[1.0]], [[0.0]]))
 
@@ -146,7 +148,7 @@ def test_generalized_plants_from_any_object(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("n_u", [1, 3])
 def test_a_system_over_a_box_as_a_mat_file(
-    random_system: RandomSystem, positions: Array, tmp_path: Path, n_u: int
+    random_system: Callable[..., LPVStateSpace], positions: Array, tmp_path: Path, n_u: int
 ) -> None:
     G = random_system(3, 4, n_u, 1, D="constant")
     write_mat(tmp_path / "G.mat", G)
