@@ -69,5 +69,15 @@ from lpvhinf.progress import Progress as Progress
 from lpvhinf.statespace import GeneralizedPlant as GeneralizedPlant
 from lpvhinf.statespace import LPVGeneralizedPlant as LPVGeneralizedPlant
 from lpvhinf.statespace import LPVStateSpace as LPVStateSpace
+from lpvhinf.export import SampledController as SampledController
+from lpvhinf.export import sampled as sampled
+from lpvhinf.simulation import MotionLimits as MotionLimits
+from lpvhinf.simulation import RigidBodyFeedforward as RigidBodyFeedforward
+from lpvhinf.simulation import Trajectory as Trajectory
+from lpvhinf.simulation import point_to_point as point_to_point
+from lpvhinf.simulation import scan as scan
+from lpvhinf.robustness import Uncertainty as Uncertainty
+from lpvhinf.robustness import monte_carlo as monte_carlo
+from lpvhinf.robustness import worst_case as worst_case
 
 __version__ = "0.1.0"

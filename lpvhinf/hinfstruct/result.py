@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from lpvhinf.checks import Array
+from lpvhinf.notebook import properties
 
 if TYPE_CHECKING:
     import control
@@ -133,3 +134,20 @@ class HinfstructResult:
             f"HinfstructResult(gamma={self.gamma:.6g}, {len(self.gammas)} plant(s), "
             f"{self.parameters.size} parameters, optimality={self.optimality:.2g}, status={self.status!r})"
         )
+
+    def _repr_html_(self) -> str:
+        values = [
+            ("gamma", f"{self.gamma:.6g}"),
+            ("over the positions", f"{self.gamma_worst:.6g}"),
+            ("lower bound", "not computed" if self.lower_bound is None else f"{self.lower_bound:.6g}"),
+            ("plants", str(len(self.gammas))),
+            ("parameters", str(self.parameters.size)),
+            ("stabilizing", "yes" if self.stabilizing else "no"),
+            ("optimality", f"{self.optimality:.2g}"),
+            *(
+                (f"constraint {i + 1}", f"{goal.value:.6g}, {'holds' if goal.level <= 0.0 else 'fails'}")
+                for i, goal in enumerate(self.constraints)
+            ),
+            ("status", self.status),
+        ]
+        return properties("HinfstructResult", values)

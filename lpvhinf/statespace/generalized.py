@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from lpvhinf.checks import Array, finite_array, read_only
 from lpvhinf.errors import AssumptionError, DimensionError
+from lpvhinf.notebook import table
+from lpvhinf.statespace.interop import state_space_matrices
 
 if TYPE_CHECKING:
     import control
@@ -121,18 +123,36 @@ class GeneralizedPlant:
     def __repr__(self) -> str:
         return f"GeneralizedPlant(n_x={self.n_x}, n_w={self.n_w}, n_u={self.n_u}, n_z={self.n_z}, n_y={self.n_y})"
 
+    def _repr_html_(self) -> str:
+        head = ["", f"x ({self.n_x})", f"w ({self.n_w})", f"u ({self.n_u})"]
+        names = (
+            ("x'", "A", "B1", "B2"),
+            (f"z ({self.n_z})", "C1", "D11", "D12"),
+            (f"y ({self.n_y})", "C2", "D21", "D22"),
+        )
+        # a zero block is worth knowing: D11, D22 decide what a synthesis can do
+        rows = [
+            [name, *(block if np.any(getattr(self, block)) else "0" for block in blocks)] for name, *blocks in names
+        ]
+        return table("GeneralizedPlant", [head, *rows])
+
     @classmethod
-    def from_control(cls, P: control.StateSpace, n_y: int, n_u: int) -> GeneralizedPlant:
-        """Partition a state space: its last `n_u` inputs are u and its last `n_y` outputs are y.
+    def from_control(cls, P: Any, n_y: int, n_u: int) -> GeneralizedPlant:
+        """Partition a system: its last `n_u` inputs are u and its last `n_y` outputs are y.
+
+        Parameters
+        ----------
+        P : control.StateSpace, control.TransferFunction, scipy.signal.lti, (A, B, C, D) or a gain matrix
+        n_y, n_u : int
 
         Raises
         ------
         DimensionError
             If P has fewer than `n_u` inputs or `n_y` outputs, or is in discrete time.
+        DomainError
+            If P is of another kind.
         """
-        A, B, C, D = (np.atleast_2d(np.asarray(m, dtype=float)) for m in (P.A, P.B, P.C, P.D))
-        if P.dt not in (None, 0):
-            raise DimensionError(f"P has the sampling time {P.dt}, wanted continuous time. Convert it first.")
+        A, B, C, D = state_space_matrices(P)
         n_w, n_z = D.shape[1] - n_u, D.shape[0] - n_y
         if min(n_w, n_z) < 0 or min(n_u, n_y) < 0:
             raise DimensionError(f"P is {D.shape[0]}x{D.shape[1]}, wanted at least {n_y} outputs and {n_u} inputs.")

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from lpvhinf.checks import Array
 from lpvhinf.errors import DimensionError
+from lpvhinf.notebook import properties
 from lpvhinf.statespace.generalized import GeneralizedPlant
 from lpvhinf.statespace.lpv import LPVStateSpace
 
@@ -54,6 +55,10 @@ class LPVGeneralizedPlant:
     def n_z(self) -> int:
         """Number of performance outputs."""
         return self.system.n_y - self.n_y
+
+    def _repr_html_(self) -> str:
+        sizes = f"w ({self.n_w}), u ({self.n_u}) to z ({self.n_z}), y ({self.n_y})"
+        return properties("LPVGeneralizedPlant", [("channels", sizes)]) + self.system._repr_html_()
 
     def at(self, p: ArrayLike) -> GeneralizedPlant:
         """The frozen plant at one position."""
