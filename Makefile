@@ -17,6 +17,7 @@ JOBS ?= 2
 STUDY := results/output_observer
 ERROR := results/error_observer
 PLANT := results/plant
+CERTIFICATES := results/certify
 PIP_TOOLS := 7.6.2
 
 # Small matrices are slower with many threads, and sums in another order would change the last digits.
@@ -40,13 +41,21 @@ reproduce: $(READY) ## the studies of the plant and of the paper, with their fig
 	$(PY) -m studies run feedforward --preset paper --out results/feedforward
 	$(PY) -m paper_figures --from results/feedforward --out results/feedforward/figures
 	$(PY) -m studies.claims --from results --out results/claims
+	$(PY) -m studies.certify --from $(STUDY) --from $(ERROR) --preset quick --out $(CERTIFICATES)
+	$(PY) -m paper_figures.certify_cells --from $(CERTIFICATES) --out $(CERTIFICATES)/figures
 
-reproduce-all: reproduce bench ## the above, more modes, bandwidths and seeds, fully actuated plants, and the benchmarks
+reproduce-all: reproduce bench ## the above, more modes, bandwidths and seeds, fully actuated plants, robustness, and the benchmarks
 	$(PY) -m studies run error_observer --preset full --out $(ERROR)
 	$(PY) -m paper_figures --from $(ERROR) --out $(ERROR)/figures
 	$(PY) -m studies run full_actuation --preset paper --out results/full_actuation
 	$(PY) -m paper_figures --from results/full_actuation --out results/full_actuation/figures
+	$(PY) -m studies run motion --preset paper --out results/motion
+	$(PY) -m paper_figures --from results/motion --out results/motion/figures
+	$(PY) -m studies run robustness --preset paper --out results/robustness
+	$(PY) -m paper_figures --from results/robustness --out results/robustness/figures
 	$(PY) -m studies.claims --from results --out results/claims
+	$(PY) -m studies.certify --from $(STUDY) --from $(ERROR) --preset full --out $(CERTIFICATES)
+	$(PY) -m paper_figures.certify_cells --from $(CERTIFICATES) --out $(CERTIFICATES)/figures
 
 test: $(READY) ## the tests of a few minutes
 	$(PY) -m pytest -n $(JOBS) --dist loadfile -m "not slow"

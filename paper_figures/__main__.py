@@ -15,11 +15,13 @@ from paper_figures import (
     feedforward_excitation,
     feedforward_steps,
     full_actuation_band_pass,
+    motion,
     plant_coil_currents,
     plant_frf,
     plant_modal_gains,
     plant_mode_shapes,
     plant_top_view,
+    robustness,
     six_block,
     trade_off,
     two_by_two,
@@ -36,6 +38,8 @@ FIGURES: dict[str, dict[str, Any]] = {
     },
     "feedforward": {module.NAME: module for module in (feedforward_excitation, feedforward_steps)},
     "full_actuation": {full_actuation_band_pass.NAME: full_actuation_band_pass},
+    "motion": {motion.NAME: motion},
+    "robustness": {robustness.NAME: robustness},
 }
 
 

@@ -16,3 +16,7 @@ from lpvhinf.certify.engine import l2_gain as l2_gain
 from lpvhinf.certify.engine import stability as stability
 from lpvhinf.certify.global_lyapunov import GlobalLyapunov as GlobalLyapunov
 from lpvhinf.certify.global_lyapunov import constant_lyapunov as constant_lyapunov
+from lpvhinf.certify.largest import Strongest as Strongest
+from lpvhinf.certify.largest import largest_quadratic_box as largest_quadratic_box
+from lpvhinf.certify.largest import largest_rate as largest_rate
+from lpvhinf.certify.largest import smallest_gain as smallest_gain

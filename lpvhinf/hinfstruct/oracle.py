@@ -251,8 +251,9 @@ class NormOracle:
             peaks = find_peaks(models.response(i), extra=extra, fraction=0.0, floor=floor)
             for omega in peaks.omega:
                 out += self._cuts_at(point, i, float(omega), self.cluster)
-            for omega in plateau(models.response(i), peaks.omega, FLAT * models.top):
-                out += self._cuts_at(point, i, float(omega), 0.02)
+            if self._small:  # among many plants the others' peaks do the same, and plateaus would multiply the cuts
+                for omega in plateau(models.response(i), peaks.omega, FLAT * models.top):
+                    out += self._cuts_at(point, i, float(omega), 0.02)
         return out
 
     def _cuts_at(self, point: Point, plant: int, omega: float, cluster: float) -> list[Cut]:

@@ -1,17 +1,29 @@
 """What set-points, feedforward and disturbances do to plant and loops over time."""
 
+from lpvhinf.simulation.actuators import Actuators as Actuators
 from lpvhinf.simulation.excitation import ModeExcitation as ModeExcitation
 from lpvhinf.simulation.excitation import WorstExcitation as WorstExcitation
 from lpvhinf.simulation.excitation import mode_excitation as mode_excitation
 from lpvhinf.simulation.excitation import worst_excitation as worst_excitation
 from lpvhinf.simulation.feedforward import RigidBodyFeedforward as RigidBodyFeedforward
 from lpvhinf.simulation.limits import MotionLimits as MotionLimits
+from lpvhinf.simulation.loop import Motion as Motion
+from lpvhinf.simulation.loop import simulate as simulate
+from lpvhinf.simulation.measures import WindowErrors as WindowErrors
+from lpvhinf.simulation.measures import moving_statistics as moving_statistics
+from lpvhinf.simulation.measures import rms_and_peak as rms_and_peak
+from lpvhinf.simulation.measures import settling_time as settling_time
+from lpvhinf.simulation.measures import window_errors as window_errors
 from lpvhinf.simulation.moves import chain as chain
 from lpvhinf.simulation.moves import hold as hold
 from lpvhinf.simulation.moves import point_to_point as point_to_point
+from lpvhinf.simulation.plant_steps import ModalPlant as ModalPlant
 from lpvhinf.simulation.scanning import Scan as Scan
 from lpvhinf.simulation.scanning import scan as scan
 from lpvhinf.simulation.setpoint import FourthOrderStep as FourthOrderStep
+from lpvhinf.simulation.spectra import CumulativePower as CumulativePower
+from lpvhinf.simulation.spectra import cumulative_power as cumulative_power
+from lpvhinf.simulation.spectra import floor_acceleration as floor_acceleration
 from lpvhinf.simulation.step_error import StepError as StepError
 from lpvhinf.simulation.step_error import step_error as step_error
 from lpvhinf.simulation.step_error import step_response as step_response
