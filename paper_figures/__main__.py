@@ -11,10 +11,12 @@ from typing import Any
 from lpvhinf.cli.exit_status import exit_status
 from lpvhinf.errors import DomainError
 from paper_figures import (
+    certify_cells,
     damping_trade,
     feedforward_excitation,
     feedforward_steps,
     full_actuation_band_pass,
+    lpv_gamma,
     motion,
     plant_coil_currents,
     plant_frf,
@@ -38,6 +40,8 @@ FIGURES: dict[str, dict[str, Any]] = {
     },
     "feedforward": {module.NAME: module for module in (feedforward_excitation, feedforward_steps)},
     "full_actuation": {full_actuation_band_pass.NAME: full_actuation_band_pass},
+    "lpv": {lpv_gamma.NAME: lpv_gamma},
+    "certify": {certify_cells.NAME: certify_cells},
     "motion": {motion.NAME: motion},
     "robustness": {robustness.NAME: robustness},
 }

@@ -10,7 +10,7 @@ from typing import Any
 
 from lpvhinf.cli.exit_status import exit_status
 from lpvhinf.cli.terminal import TerminalProgress
-from studies import error_observer, feedforward, full_actuation, motion, output_observer, plant, robustness
+from studies import error_observer, feedforward, full_actuation, lpv, motion, output_observer, plant, robustness
 from studies.results import of_the_study
 from studies.settings import load_settings
 
@@ -20,6 +20,7 @@ STUDIES: dict[str, Any] = {
     plant.NAME: plant,
     feedforward.NAME: feedforward,
     full_actuation.NAME: full_actuation,
+    lpv.NAME: lpv,
     motion.NAME: motion,
     robustness.NAME: robustness,
 }

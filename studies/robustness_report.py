@@ -64,8 +64,9 @@ def markdown(report: dict[str, Any]) -> str:
         f"{_range(settings['frequency'])}, masses, inertias and modal masses {_range(settings['mass'])}, commutation "
         f"misaligned by {1e6 * settings['misalignment'][0]:g}-{1e6 * settings['misalignment'][1]:g} um in x and y. "
         f"Damping spread: {100 * spread[0]:g}-{100 * spread[1]:g} % for every mode by itself, uniform in its "
-        f"logarithm; held: {100 * held:g} %, as in the designs, which were made without delay. Delay {1e6 * settings['delay']:g} us: Padé filter in continuous "
-        f"time, and exact at {1e-3 / settings['sample_time']:g} kHz, where the hold comes on top of it.",
+        f"logarithm; held: {100 * held:g} %, as in the designs, which were made without delay. "
+        f"Delay {1e6 * settings['delay']:g} us: Padé filter in continuous time, and exact at "
+        f"{1e-3 / settings['sample_time']:g} kHz, where the hold comes on top of it.",
         "",
         "## Shares",
         "",

@@ -20,7 +20,8 @@ MEMORY = 3
 PATIENCE = 12
 #: Parts of the radius that are tried before a model is given up.
 SHRINK = (1.0, 0.1, 0.01, 1e-3)
-#: A step that gains less than this part of what straight cuts promise within the same radius is defeated by curvature.
+#: A step that gains less than this part of what straight cuts promise within the same radius is defeated by curvature;
+#: to look for a better radius is `thorough`, and dear where there are many plants and parameters.
 DEFEAT = 0.05
 
 
@@ -33,6 +34,7 @@ def bundle(
     tolerance: float = 1e-7,
     target: float = -np.inf,
     radius: float | None = None,
+    thorough: bool = False,
     accepted: Callable[[Point], None] | None = None,
 ) -> Descent:
     r"""Polish a minimiser of a maximum of smooth functions.
@@ -83,7 +85,7 @@ def bundle(
             found = model.step(weights, shrink * radius)
             if found is not None and (step is None or found.decrease > step.decrease):
                 step, part = found, shrink
-            if step is not None and step.decrease > max(1e-2 * tolerance, DEFEAT * model.straight_decrease):
+            if step is not None and step.decrease > max(1e-2 * tolerance, DEFEAT * model.straight_decrease * thorough):
                 break
         if step is None or step.decrease <= 1e-2 * tolerance:
             return Descent(point, "no predicted decrease", iteration, optimality)

@@ -21,7 +21,7 @@ from lpvhinf.hinfstruct.problem import Budget as Budget
 from lpvhinf.hinfstruct.problem import Cut as Cut
 from lpvhinf.hinfstruct.problem import Oracle as Oracle
 from lpvhinf.hinfstruct.problem import Point as Point
-from lpvhinf.hinfstruct.response import Response
+from lpvhinf.hinfstruct.response import Response, spectral_abscissa
 
 #: Parameters beyond this count as infinite.
 LARGEST = 1e9
@@ -156,7 +156,7 @@ class NormOracle:
         loop = models.loops[i]
         assert loop is not None
         if self._small and loop.A.shape[0]:
-            if np.max(np.linalg.eigvals(loop.A).real) >= 0.0:
+            if spectral_abscissa(np.linalg.eigvals(loop.A).astype(complex)) >= 0.0:
                 return None
             self.budget.exact += 1
             found = slicot_peak(loop.A, loop.B, loop.C, loop.D)

@@ -12,6 +12,15 @@ Complex = NDArray[np.complex128]
 
 #: Above this condition number (1-norm) of the eigenvectors the Schur form is used.
 EIGENVECTOR_LIMIT = 1e8
+#: Error of a computed eigenvalue, in units of the number of states times the largest pole: a hundred roundings.
+ROUND_OFF = 100.0 * float(np.finfo(float).eps)
+
+
+def spectral_abscissa(poles: Complex) -> float:
+    """Largest real part of poles (n,), plus the round-off of an eigenvalue: a pole at zero must not pass for stable."""
+    if poles.size == 0:
+        return -np.inf
+    return float(np.max(poles.real) + ROUND_OFF * poles.size * np.max(np.abs(poles)))
 
 
 class Response:
@@ -25,7 +34,7 @@ class Response:
     ----------
     poles : (n,) complex
     abscissa : float
-        Largest real part of the poles; -inf without states.
+        Largest real part of the poles, round-off counted against stability; -inf without states.
     right, left : (n, n) complex or None
         Columns and rows are right and left eigenvectors of A, left = right^-1; None where nearly dependent.
     """
@@ -45,7 +54,7 @@ class Response:
         balanced, (scale, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True, overwrite_a=False)
         poles, V = np.linalg.eig(balanced)
         self.poles = poles.astype(complex)
-        self.abscissa = float(np.max(poles.real))
+        self.abscissa = spectral_abscissa(poles)
         Bb, Cb = B / scale[:, None], C * scale
         try:
             Vi = np.linalg.inv(V)
@@ -58,7 +67,7 @@ class Response:
         else:
             self._triangle, Z = scipy.linalg.schur(balanced, output="complex")
             self.poles = np.diagonal(self._triangle).copy()
-            self.abscissa = float(np.max(self.poles.real))
+            self.abscissa = spectral_abscissa(self.poles)
             self._b, self._c = Z.conj().T @ Bb, Cb @ Z
 
     def _solve(self, s: Complex, X: Complex) -> Complex:

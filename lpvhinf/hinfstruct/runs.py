@@ -222,7 +222,14 @@ def polish(task: Task, listen: Listener | None = None) -> Outcome:
             heard = _heard(oracle, listen, "polish")
         start = oracle.confirm(oracle.evaluate(theta))
         run = bundle(
-            oracle, start, budget, max_iterations=left, tolerance=task.tolerance, radius=radius, accepted=heard
+            oracle,
+            start,
+            budget,
+            max_iterations=left,
+            tolerance=task.tolerance,
+            radius=radius,
+            thorough=len(task.plants) == 1,
+            accepted=heard,
         )
         gained = gamma - oracle.gamma(run.point)
         left -= run.iterations
