@@ -59,7 +59,9 @@ def test_a_move_keeps_its_limits_and_ends_at_rest_where_it_should(
     arriving = move.evaluate([np.nextafter(T, 0.0)])[:, 0, 0]
     assert arriving[0] == pytest.approx(distance, rel=1e-10)
     scale = np.array([distance / T, distance / T**2, distance / T**3])
-    assert np.all(np.abs(arriving[1:4]) <= 1e-9 * scale * np.maximum(1.0, move.peaks[:3, 0] / scale))
+    # a time is known to its last digit only, in which the next derivative acts
+    late = 8.0 * np.spacing(T) * move.peaks[1:4, 0]
+    assert np.all(np.abs(arriving[1:4]) <= 1e-9 * scale * np.maximum(1.0, move.peaks[:3, 0] / scale) + late)
 
 
 @quickly
