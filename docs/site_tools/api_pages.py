@@ -1,0 +1,144 @@
+"""Write the pages of the API reference: every public name, grouped by the room that it lives in.
+
+The names are those that `lpvhinf/__init__.py` and the `__init__.py` of each room re-export, so that a name that is
+published has its page, and the pages need no care of their own.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+# Room, title of its page; rooms without an entry follow under the name that they have.
+TITLES = {
+    "codesign": "Co-design",
+    "hinfstruct": "Structured H-infinity synthesis",
+    "hinfstruct.uncertainty": "Dynamic uncertainty",
+    "lpv": "LPV synthesis and analysis",
+    "certify": "Certificates",
+    "statespace": "State spaces",
+    "plant": "Plants",
+    "plant.mmpa": "The planar actuator",
+    "decoupling": "Decoupling",
+    "controllers": "Controllers of the paper",
+    "shaping": "Shaping filters",
+    "problems": "Generalized plants of the paper",
+    "simulation": "Set-points and simulation",
+    "robustness": "Robustness",
+    "export": "Export",
+    "plotting": "Figures",
+    "errors": "Errors",
+    "progress": "Progress",
+}
+PACKAGE = "lpvhinf"
+
+
+def reexported(module: Path) -> dict[str, str]:
+    """The names that an `__init__.py` re-exports (``import X as X``), and the module that each comes from."""
+    found = {}
+    for node in ast.parse(module.read_text("utf-8")).body:
+        if isinstance(node, ast.ImportFrom) and node.module is not None:
+            found |= {alias.name: node.module for alias in node.names if alias.asname == alias.name}
+    return found
+
+
+def public_names(package: Path) -> dict[str, dict[str, list[str]]]:
+    """Public names by room: those importable from the package itself, and those of the room alone.
+
+    Parameters
+    ----------
+    package : Path
+        Folder of the package.
+
+    Returns
+    -------
+    dict
+        Room to {"package": names, "room": names}; a submodule such as `certify` is no name of its own.
+    """
+    rooms: dict[str, dict[str, list[str]]] = {room: {"package": [], "room": []} for room in TITLES}
+    for name, module in reexported(package / "__init__.py").items():
+        if not (package / name).is_dir() or name in (module.rpartition(".")[2], "hinfstruct", "codesign"):
+            room = module.removeprefix(PACKAGE).lstrip(".")
+            if not _is_module(package, room, name):
+                rooms.setdefault(room, {"package": [], "room": []})["package"].append(name)
+    for init in sorted(package.rglob("__init__.py")):
+        room = ".".join(init.parent.relative_to(package).parts)
+        if not room or (room not in rooms and "." in room):
+            continue
+        names = [name for name in reexported(init) if not _is_module(package, room, name)]
+        known = rooms.setdefault(room, {"package": [], "room": []})
+        known["room"] = [name for name in names if name not in known["package"]]
+    for room in ("shaping", "errors", "progress"):
+        known = rooms[room]
+        known["room"] = [name for name in _defined(package / f"{room}.py") if name not in known["package"]]
+    return {room: names for room, names in rooms.items() if names["package"] or names["room"]}
+
+
+def _is_module(package: Path, room: str, name: str) -> bool:
+    """Whether a name that `room` re-exports is a folder or a file of its own there, and not an object in it."""
+    folder = package.joinpath(*room.split(".")) if room else package
+    return (folder / name / "__init__.py").is_file() and not hasattr(_load(room, name), "__qualname__")
+
+
+def _load(room: str, name: str) -> object:
+    return getattr(import_module(f"{PACKAGE}.{room}" if room else PACKAGE), name)
+
+
+def _defined(module: Path) -> Iterator[str]:
+    """Public functions and classes that a file defines."""
+    for node in ast.parse(module.read_text("utf-8")).body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
+            yield node.name
+
+
+def directive(module: str, name: str) -> str:
+    """The autodoc directive of one name."""
+    value = getattr(import_module(module), name)
+    if inspect.isclass(value):
+        return f".. autoclass:: {name}\n   :members:\n   :show-inheritance:\n"
+    if callable(value):
+        return f".. autofunction:: {name}\n"
+    return f".. py:data:: {name}\n"  # the docstring of a value is that of its type
+
+
+def page(room: str, names: dict[str, list[str]]) -> str:
+    """The reStructuredText of a room's page."""
+    title = TITLES.get(room, room)
+    module: ModuleType = import_module(f"{PACKAGE}.{room}")
+    summary = (inspect.getdoc(module) or "").split("\n\n")[0]
+    parts = [f"{title}\n{'=' * len(title)}\n", f"``{PACKAGE}.{room}``\n", summary + "\n"]
+    if names["package"]:
+        parts += [f"Importable from ``{PACKAGE}``\n{'-' * 60}\n", f".. currentmodule:: {PACKAGE}\n"]
+        parts += [directive(PACKAGE, name) for name in names["package"]]
+    if names["room"]:
+        heading = f"Importable from ``{PACKAGE}.{room}``"
+        parts += [f"{heading}\n{'-' * len(heading)}\n", f".. currentmodule:: {PACKAGE}.{room}\n"]
+        parts += [directive(f"{PACKAGE}.{room}", name) for name in names["room"]]
+    return "\n".join(parts)
+
+
+def write_pages(package: Path, folder: Path) -> list[Path]:
+    """Write a page for each room and their index into `folder`; files that are not among them are removed.
+
+    A page that would not change is left alone, so that the site's next build need not read it again.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    rooms = public_names(package)
+    texts = {f"{room.replace('.', '_')}.rst": page(room, names) for room, names in rooms.items()}
+    listing = "".join(f"   {Path(name).stem}\n" for name in texts)
+    texts["index.rst"] = (
+        "API reference\n=============\n\nEvery public name, by the room that it lives in. ``import lpvhinf as lh`` gives the "
+        f"names that users need most;\nthe others are in the rooms.\n\n.. toctree::\n   :maxdepth: 1\n\n{listing}"
+    )
+    for name, text in texts.items():
+        path = folder / name
+        if not path.is_file() or path.read_text("utf-8") != text:
+            path.write_text(text, "utf-8")
+    for path in folder.glob("*.rst"):
+        if path.name not in texts:
+            path.unlink()
+    return [folder / name for name in texts]
