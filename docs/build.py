@@ -5,7 +5,8 @@ Between ``<!-- begin: NAME -->`` and ``<!-- end: NAME -->`` stands what NAME say
 * ``results/.../report.md``: the file; ``results/.../report.md#Title``: one section of it, without its title;
 * ``figure results/.../name.png: text``: the figure, copied to docs/images, with `text` for those who cannot see it
   (the text is left out of the end marker);
-* ``output PAGE.md 1``: what the page's first Python block prints.
+* ``output PAGE.md 1``: what the page's first Python block prints;
+* ``session PAGE.md 2``: what the page's second Python block prints after those before it, in one session.
 
 Where a file is missing (results are not part of a checkout), the quoted text stays and a line says so.
 
@@ -16,11 +17,13 @@ page differs or a link is broken. With ``--no-run`` no Python block is run.
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import re
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -28,6 +31,18 @@ IMAGES = Path("docs/images")
 BLOCK = re.compile(r"<!-- begin: (?P<name>[^\n]+?) -->\n(?P<body>.*?)<!-- end: (?P<end>[^\n]+?) -->", re.DOTALL)
 FENCE = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```[^\n]*$", re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\[[^\]\n]*\]\((?P<target>[^)\s]+)\)")
+RUN = ("output", "session")  # what is quoted from a run of Python blocks
+# Runs blocks of a page (a JSON list on the standard input) in one name space and returns what each printed.
+SESSION = """
+import contextlib, io, json, sys
+blocks, scope, printed = json.load(sys.stdin), {"__name__": "__main__"}, []
+for number, code in enumerate(blocks, 1):
+    heard = io.StringIO()
+    with contextlib.redirect_stdout(heard):
+        exec(compile(code, f"<block {number}>", "exec"), scope)
+    printed.append(heard.getvalue())
+json.dump(printed, sys.stdout)
+"""
 
 
 class Missing(Exception):
@@ -69,17 +84,30 @@ def figure(name: str, text: str, page: Path, *, write: bool) -> str:
     return f"![{text}]({Path(os.path.relpath(copy, page.parent)).as_posix()})\n"
 
 
-def output(page_name: str, number: int) -> str:
-    """What a Python block of a page prints, as a text block."""
-    blocks = [code for language, code in FENCE.findall(source(page_name).read_text("utf-8")) if language == "python"]
-    if not 1 <= number <= len(blocks):
-        raise SystemExit(f"docs/build.py: {page_name} has {len(blocks)} Python blocks, block {number} is quoted")
+def python_blocks(page_name: str) -> list[str]:
+    """The Python blocks of a page, in their order."""
+    return [code for language, code in FENCE.findall(source(page_name).read_text("utf-8")) if language == "python"]
+
+
+@lru_cache
+def printed(page_name: str, blocks: tuple[str, ...]) -> list[str]:
+    """What each of some blocks prints, one after another in one session of its own."""
+    command = [sys.executable, "-W", "error", "-c", SESSION]
     run = subprocess.run(
-        [sys.executable, "-c", blocks[number - 1]], cwd=ROOT, capture_output=True, text=True, check=False
+        command, input=json.dumps(blocks), cwd=ROOT, capture_output=True, text=True, encoding="utf-8", check=False
     )
     if run.returncode != 0:
-        raise SystemExit(f"docs/build.py: block {number} of {page_name} fails:\n{run.stderr}")
-    return f"```text\n{run.stdout.rstrip()}\n```\n"
+        raise SystemExit(f"docs/build.py: a Python block of {page_name} fails:\n{run.stderr}")
+    return [str(text) for text in json.loads(run.stdout)]
+
+
+def output(page_name: str, number: int, *, session: bool = False) -> str:
+    """What a Python block of a page prints, alone or after the blocks before it, as a text block."""
+    blocks = python_blocks(page_name)
+    if not 1 <= number <= len(blocks):
+        raise SystemExit(f"docs/build.py: {page_name} has {len(blocks)} Python blocks, block {number} is quoted")
+    text = printed(page_name, tuple(blocks))[number - 1] if session else printed(page_name, (blocks[number - 1],))[0]
+    return f"```text\n{text.rstrip()}\n```\n"
 
 
 def content(name: str, page: Path, *, write: bool) -> str:
@@ -88,9 +116,9 @@ def content(name: str, page: Path, *, write: bool) -> str:
     if kind == "figure":
         path, _, text = rest.partition(": ")
         return figure(path, text, page, write=write)
-    if kind == "output":
+    if kind in RUN:
         page_name, number = rest.rsplit(" ", 1)
-        return output(page_name, int(number))
+        return output(page_name, int(number), session=kind == "session")
     path, _, title = name.partition("#")
     text = source(path).read_text("utf-8")
     return section(text, title) if title else text.strip() + "\n"
@@ -103,7 +131,7 @@ def refreshed(page: Path, *, write: bool, run: bool, notes: list[str]) -> str:
         name, end = match["name"], match["end"]
         if name.split(": ")[0] != end:
             raise SystemExit(f"docs/build.py: {page.name}: 'begin: {name}' is closed by 'end: {end}'")
-        if name.startswith("output ") and not run:
+        if name.partition(" ")[0] in RUN and not run:
             return match[0]
         try:
             body = content(name, page, write=write)
