@@ -5,6 +5,7 @@ Between ``<!-- begin: NAME -->`` and ``<!-- end: NAME -->`` stands what NAME say
 * ``results/.../report.md``: the file; ``results/.../report.md#Title``: one section of it, without its title;
 * ``figure results/.../name.png: text``: the figure, copied to docs/images, with `text` for those who cannot see it
   (the text is left out of the end marker);
+* ``gallery``: every figure in docs/images, with what it shows and the commands that draw it;
 * ``output PAGE.md 1``: what the page's first Python block prints;
 * ``session PAGE.md 2``: what the page's second Python block prints after those before it, in one session.
 
@@ -17,6 +18,7 @@ page differs or a link is broken. With ``--no-run`` no Python block is run.
 from __future__ import annotations
 
 import argparse
+import ast
 import json
 import os
 import re
@@ -27,6 +29,7 @@ from functools import lru_cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))  # for the table of figures in paper_figures
 IMAGES = Path("docs/images")
 BLOCK = re.compile(r"<!-- begin: (?P<name>[^\n]+?) -->\n(?P<body>.*?)<!-- end: (?P<end>[^\n]+?) -->", re.DOTALL)
 FENCE = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```[^\n]*$", re.DOTALL | re.MULTILINE)
@@ -84,6 +87,41 @@ def figure(name: str, text: str, page: Path, *, write: bool) -> str:
     return f"![{text}]({Path(os.path.relpath(copy, page.parent)).as_posix()})\n"
 
 
+def gallery() -> str:
+    """Every figure in docs/images, with the first line of its script and the commands that draw it."""
+    from paper_figures.__main__ import FIGURES
+    from studies.__main__ import STUDIES
+
+    studies = {name: study for study, figures in FIGURES.items() for name in figures}
+    shown = {Path(m["name"].split(": ")[0]).stem: m["name"].partition(": ")[2] for m in figure_markers()}
+    parts = []
+    for image in sorted((ROOT / IMAGES).glob("*.png")):
+        name = image.stem
+        summary = (ast.get_docstring(ast.parse(source(f"paper_figures/{name}.py").read_text("utf-8"))) or "").split("\n\n")[0]
+        summary = " ".join(summary.split())
+        commands = [f"python -m paper_figures.{name} --out figures"]
+        if name in studies:
+            study = studies[name]
+            run = f"python -m studies run {study} --preset paper --out results/{study}"
+            commands = [
+                run if study in STUDIES else "make reproduce",
+                f"python -m paper_figures {name} --from results/{study} --out figures",
+            ]
+        title = name.replace("_", " ").capitalize()
+        parts.append(
+            f"## {title}\n\n{summary}\n\n![{shown.get(name) or title}](images/{image.name})\n\n```sh\n"
+            + "\n".join(commands)
+            + "\n```\n"
+        )
+    return "\n".join(parts)
+
+
+def figure_markers() -> Iterator[re.Match[str]]:
+    """The markers of figures on all pages."""
+    for page in pages():
+        yield from (m for m in BLOCK.finditer(page.read_text("utf-8")) if m["name"].startswith("figure "))
+
+
 def python_blocks(page_name: str) -> list[str]:
     """The Python blocks of a page, in their order."""
     return [code for language, code in FENCE.findall(source(page_name).read_text("utf-8")) if language == "python"]
@@ -116,6 +154,8 @@ def content(name: str, page: Path, *, write: bool) -> str:
     if kind == "figure":
         path, _, text = rest.partition(": ")
         return figure(path, text, page, write=write)
+    if kind == "gallery":
+        return gallery()
     if kind in RUN:
         page_name, number = rest.rsplit(" ", 1)
         return output(page_name, int(number), session=kind == "session")

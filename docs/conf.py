@@ -22,18 +22,18 @@ copyright = author  # noqa: A001
 release = version = lpvhinf.__version__
 html_title = f"lpvhinf {release}"
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "site_tools.mathml", "site_tools.docstrings"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "site_tools.mathml", "site_tools.docstrings", "site_tools.navigation"]
 exclude_patterns = ["examples", "site_tools", "_*"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4  # links to headings as on GitHub
-suppress_warnings: list[str] = []
 
 default_role = "code"  # `name` in docstrings
 autodoc_typehints = "none"  # docstrings say shapes and units, which tell more
 autodoc_member_order = "bysource"
 autodoc_class_signature = "mixed"
+autodoc_preserve_defaults = True  # `SILENT`, not where it lies in memory
 napoleon_google_docstring = False
 napoleon_use_ivar = True  # attributes of a dataclass once, not as members again
 napoleon_use_rtype = False

@@ -6,6 +6,7 @@ The translation from LaTeX is that of docutils, which Sphinx brings with it.
 from __future__ import annotations
 
 import html
+import re
 from typing import Any
 
 from docutils import nodes
@@ -14,6 +15,9 @@ from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.util import logging
 
 logger = logging.getLogger(__name__)
+
+# Commands of LaTeX that docutils knows by another name.
+SYNONYMS = ((re.compile(r"\\dots(?![a-zA-Z])"), r"\\ldots"), (re.compile(r"\\(big|Big|bigg|Bigg)(?![a-zA-Z])"), r"\\\1l"))
 
 
 def mathml(source: str, *, block: bool, location: Any = None) -> str:
@@ -25,6 +29,8 @@ def mathml(source: str, *, block: bool, location: Any = None) -> str:
     True
     """
     formula = source.strip()
+    for command, name in SYNONYMS:
+        formula = command.sub(name, formula)
     try:
         return str(tex2mathml(formula.translate(unichar2tex.uni2tex_table), as_block=block))
     except (MathError, SyntaxError, KeyError, IndexError) as error:
