@@ -18,6 +18,7 @@ STUDY := results/output_observer
 ERROR := results/error_observer
 PLANT := results/plant
 CERTIFICATES := results/certify
+SITE := build/site
 PIP_TOOLS := 7.6.2
 
 # Small matrices are slower with many threads, and sums in another order would change the last digits.
@@ -71,8 +72,10 @@ lint: $(READY) ## style, format and types
 bench: $(READY) ## timings as ratios within one run, in results/benchmarks
 	$(PY) -m benchmarks --out results/benchmarks
 
-docs: $(READY) ## redraw the diagrams, refresh the quoted results in README.md and docs, check the links
+docs: $(READY) ## refresh the quoted results in README.md and docs, check the links, build the site in build/site
 	$(PY) docs/build.py
+	rm -rf $(SITE)
+	$(PY) -m sphinx --builder html --quiet --fail-on-warning --keep-going --fresh-env docs $(SITE)
 
 lock: ## resolve requirements.lock anew from pyproject.toml (UPGRADE=1 takes newer versions)
 	$(call need_python)
@@ -80,12 +83,12 @@ lock: ## resolve requirements.lock anew from pyproject.toml (UPGRADE=1 takes new
 	$(PYTHON) -m venv build/lock
 	build/lock/bin/python -m pip install --quiet pip-tools==$(PIP_TOOLS)
 	CUSTOM_COMPILE_COMMAND="make lock" build/lock/bin/pip-compile --quiet --no-config \
-		--extra dev --strip-extras --allow-unsafe --generate-hashes \
+		--extra dev --extra docs --strip-extras --allow-unsafe --generate-hashes \
 		--no-emit-index-url --no-emit-find-links --no-emit-trusted-host \
 		$(if $(UPGRADE),--upgrade) --output-file requirements.lock pyproject.toml
 
 clean: ## remove the environment, caches and built files; results/ stays
-	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis ./*.egg-info
+	rm -rf $(VENV) build dist docs/api .pytest_cache .mypy_cache .ruff_cache .hypothesis ./*.egg-info
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 define need_python

@@ -97,7 +97,9 @@ def gallery() -> str:
     parts = []
     for image in sorted((ROOT / IMAGES).glob("*.png")):
         name = image.stem
-        summary = (ast.get_docstring(ast.parse(source(f"paper_figures/{name}.py").read_text("utf-8"))) or "").split("\n\n")[0]
+        summary = (ast.get_docstring(ast.parse(source(f"paper_figures/{name}.py").read_text("utf-8"))) or "").split(
+            "\n\n"
+        )[0]
         summary = " ".join(summary.split())
         commands = [f"python -m paper_figures.{name} --out figures"]
         if name in studies:

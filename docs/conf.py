@@ -13,16 +13,24 @@ from typing import Any
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent), str(HERE)]
 
-import lpvhinf  # noqa: E402
 from site_tools.api_pages import write_pages  # noqa: E402
+
+import lpvhinf  # noqa: E402
 
 project = "lpvhinf"
 author = "The lpvhinf authors"
-copyright = author  # noqa: A001
+copyright = author
 release = version = lpvhinf.__version__
 html_title = f"lpvhinf {release}"
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "site_tools.mathml", "site_tools.docstrings", "site_tools.navigation"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "site_tools.mathml",
+    "site_tools.docstrings",
+    "site_tools.navigation",
+]
 exclude_patterns = ["examples", "site_tools", "_*"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 

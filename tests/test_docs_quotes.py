@@ -39,7 +39,9 @@ def load_build() -> ModuleType:
 
 
 def test_the_limits_of_the_reader_are_those_of_the_page() -> None:
-    rows = re.findall(r"^\| .+? \| `(MAX_\w+)(?:\[\"(\w+)\"\])?` \| ([\d ]+) \|$", text_of("certificate_format.md"), re.MULTILINE)
+    rows = re.findall(
+        r"^\| .+? \| `(MAX_\w+)(?:\[\"(\w+)\"\])?` \| ([\d ]+) \|$", text_of("certificate_format.md"), re.MULTILINE
+    )
     quoted = {(name, key): int(number.replace(" ", "")) for name, key, number in rows}
     known: dict[tuple[str, str], int] = {}
     for name, value in vars(reader).items():
@@ -81,7 +83,7 @@ def test_arrays_in_either_order_are_the_same_file(tmp_path: Path, order: Literal
 
 
 def resolved(name: str) -> object:
-    """The object that a dotted name on a page stands for; `lh.` is the package, a bare class one of its public names."""
+    """What a dotted name on a page stands for; `lh.` is the package, a bare class one of its public names."""
     first, *rest = name.split(".")
     if first in ("lpvhinf", "control"):
         for cut in range(len(rest), -1, -1):  # the longest module
@@ -130,7 +132,20 @@ def test_every_name_on_a_page_exists_with_the_arguments_shown(page: str) -> None
 
 def test_coming_from_matlab_names_the_functions_asked_for() -> None:
     text = text_of("coming_from_matlab.md")
-    for name in ("hinfstruct", "systune", "looptune", "hinfsyn", "lpvsyn", "lpvsynsf", "lpvnorm", "hinfgs", "LPVTools", "LPVcore", "c2d", "HIFOO"):
+    for name in (
+        "hinfstruct",
+        "systune",
+        "looptune",
+        "hinfsyn",
+        "lpvsyn",
+        "lpvsynsf",
+        "lpvnorm",
+        "hinfgs",
+        "LPVTools",
+        "LPVcore",
+        "c2d",
+        "HIFOO",
+    ):
         assert name in text
 
 

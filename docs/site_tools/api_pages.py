@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import ast
 import inspect
-from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 
 # Room, title of its page; rooms without an entry follow under the name that they have.
 TITLES = {
@@ -46,6 +44,12 @@ def reexported(module: Path) -> dict[str, str]:
     return found
 
 
+def defined(module: Path) -> list[str]:
+    """Public functions and classes that a file defines."""
+    nodes = ast.parse(module.read_text("utf-8")).body
+    return [n.name for n in nodes if isinstance(n, ast.FunctionDef | ast.ClassDef) and not n.name.startswith("_")]
+
+
 def public_names(package: Path) -> dict[str, dict[str, list[str]]]:
     """Public names by room: those importable from the package itself, and those of the room alone.
 
@@ -57,42 +61,23 @@ def public_names(package: Path) -> dict[str, dict[str, list[str]]]:
     Returns
     -------
     dict
-        Room to {"package": names, "room": names}; a submodule such as `certify` is no name of its own.
+        Room to {"package": names, "room": names}, without modules such as `certify`, which are rooms themselves.
     """
-    rooms: dict[str, dict[str, list[str]]] = {room: {"package": [], "room": []} for room in TITLES}
+    folders = {path.parent.name for path in package.glob("*/__init__.py") if reexported(path)}
+    rooms: dict[str, dict[str, list[str]]] = {
+        room: {"package": [], "room": []} for room in [*TITLES, *sorted(folders - TITLES.keys())]
+    }
     for name, module in reexported(package / "__init__.py").items():
-        if not (package / name).is_dir() or name in (module.rpartition(".")[2], "hinfstruct", "codesign"):
-            room = module.removeprefix(PACKAGE).lstrip(".")
-            if not _is_module(package, room, name):
-                rooms.setdefault(room, {"package": [], "room": []})["package"].append(name)
-    for init in sorted(package.rglob("__init__.py")):
-        room = ".".join(init.parent.relative_to(package).parts)
-        if not room or (room not in rooms and "." in room):
-            continue
-        names = [name for name in reexported(init) if not _is_module(package, room, name)]
-        known = rooms.setdefault(room, {"package": [], "room": []})
-        known["room"] = [name for name in names if name not in known["package"]]
-    for room in ("shaping", "errors", "progress"):
-        known = rooms[room]
-        known["room"] = [name for name in _defined(package / f"{room}.py") if name not in known["package"]]
+        if not inspect.ismodule(getattr(import_module(PACKAGE), name)):
+            rooms[module.removeprefix(f"{PACKAGE}.")]["package"].append(name)
+    for room, names in rooms.items():
+        path = package.joinpath(*room.split("."))
+        module = import_module(f"{PACKAGE}.{room}")
+        known = reexported(path / "__init__.py") if path.is_dir() else defined(path.with_suffix(".py"))
+        names["room"] = [
+            name for name in known if name not in names["package"] and not inspect.ismodule(getattr(module, name))
+        ]
     return {room: names for room, names in rooms.items() if names["package"] or names["room"]}
-
-
-def _is_module(package: Path, room: str, name: str) -> bool:
-    """Whether a name that `room` re-exports is a folder or a file of its own there, and not an object in it."""
-    folder = package.joinpath(*room.split(".")) if room else package
-    return (folder / name / "__init__.py").is_file() and not hasattr(_load(room, name), "__qualname__")
-
-
-def _load(room: str, name: str) -> object:
-    return getattr(import_module(f"{PACKAGE}.{room}" if room else PACKAGE), name)
-
-
-def _defined(module: Path) -> Iterator[str]:
-    """Public functions and classes that a file defines."""
-    for node in ast.parse(module.read_text("utf-8")).body:
-        if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
-            yield node.name
 
 
 def directive(module: str, name: str) -> str:
@@ -108,7 +93,7 @@ def directive(module: str, name: str) -> str:
 def page(room: str, names: dict[str, list[str]]) -> str:
     """The reStructuredText of a room's page."""
     title = TITLES.get(room, room)
-    module: ModuleType = import_module(f"{PACKAGE}.{room}")
+    module = import_module(f"{PACKAGE}.{room}")
     summary = (inspect.getdoc(module) or "").split("\n\n")[0]
     parts = [f"{title}\n{'=' * len(title)}\n", f"``{PACKAGE}.{room}``\n", summary + "\n"]
     if names["package"]:
@@ -131,8 +116,8 @@ def write_pages(package: Path, folder: Path) -> list[Path]:
     texts = {f"{room.replace('.', '_')}.rst": page(room, names) for room, names in rooms.items()}
     listing = "".join(f"   {Path(name).stem}\n" for name in texts)
     texts["index.rst"] = (
-        "API reference\n=============\n\nEvery public name, by the room that it lives in. ``import lpvhinf as lh`` gives the "
-        f"names that users need most;\nthe others are in the rooms.\n\n.. toctree::\n   :maxdepth: 1\n\n{listing}"
+        "API reference\n=============\n\nEvery public name, by the room that it lives in. ``import lpvhinf as lh`` "
+        f"gives the names that users need most;\nthe others are in the rooms.\n\n.. toctree::\n   :maxdepth: 1\n\n{listing}"
     )
     for name, text in texts.items():
         path = folder / name

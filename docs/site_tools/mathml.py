@@ -17,7 +17,10 @@ from sphinx.util import logging
 logger = logging.getLogger(__name__)
 
 # Commands of LaTeX that docutils knows by another name.
-SYNONYMS = ((re.compile(r"\\dots(?![a-zA-Z])"), r"\\ldots"), (re.compile(r"\\(big|Big|bigg|Bigg)(?![a-zA-Z])"), r"\\\1l"))
+SYNONYMS = (
+    (re.compile(r"\\dots(?![a-zA-Z])"), r"\\ldots"),
+    (re.compile(r"\\(big|Big|bigg|Bigg)(?![a-zA-Z])"), r"\\\1l"),
+)
 
 
 def mathml(source: str, *, block: bool, location: Any = None) -> str:
