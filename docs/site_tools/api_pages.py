@@ -117,7 +117,8 @@ def write_pages(package: Path, folder: Path) -> list[Path]:
     listing = "".join(f"   {Path(name).stem}\n" for name in texts)
     texts["index.rst"] = (
         "API reference\n=============\n\nEvery public name, by the room that it lives in. ``import lpvhinf as lh`` "
-        f"gives the names that users need most;\nthe others are in the rooms.\n\n.. toctree::\n   :maxdepth: 1\n\n{listing}"
+        "gives the names that users need most;\nthe others are in the rooms.\n\n"
+        f".. toctree::\n   :maxdepth: 1\n\n{listing}"
     )
     for name, text in texts.items():
         path = folder / name
