@@ -30,7 +30,7 @@ rate       p may move with speeds up to --rate on every axis
 l2         the L2 gain of the weighted loop is below --gamma, for fixed p, or with --rate for moving p
 
 A TOML file may hold the same settings (kind, rate, gamma, box, decay, time_limit, jobs); options win over it.
-The folder DESIGN/certificates takes NAME.npz (the certificate, where the claim is proved), NAME-cells.npz and NAME.json.
+The folder DESIGN/certificates takes NAME.npz (the certificate, if it is proved), NAME-cells.npz and NAME.json.
 Exit status: 0 proved, 1 refuted, undecided or an error, 130 interrupted."""
 
 Result = Certificate | Refutation | Undecided

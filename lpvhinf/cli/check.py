@@ -15,7 +15,9 @@ def add(commands: Any) -> None:
         "check", help="check a certificate again", description=__doc__,
         epilog="Exit status: 0 proved, 1 not proved, 2 not a certificate, 130 interrupted.",
     )  # fmt: skip
-    command.add_argument("file", type=Path, metavar="CERTIFICATE", help="what `lpvhinf certify` or Certificate.save wrote")
+    command.add_argument(
+        "file", type=Path, metavar="CERTIFICATE", help="what `lpvhinf certify` or Certificate.save wrote"
+    )
     command.add_argument("--exact", action="store_true", help="integers instead of floating point with rounding bounds")
     command.add_argument("--system", type=Path, help="LPVStateSpace file that the claim has to speak of")
     command.set_defaults(run=run, interrupted="not proved")

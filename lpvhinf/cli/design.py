@@ -141,4 +141,3 @@ class Keeper:
             return None
         progress.log(f"going on from a checkpoint at gamma {float(data['gamma']):.4f}")
         return np.asarray(data["theta"])
-

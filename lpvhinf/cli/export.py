@@ -31,7 +31,9 @@ def add(commands: Any) -> None:
     )  # fmt: skip
     add_design(command)
     command.add_argument("--format", choices=FORMATS, action="append", help="may be repeated, default all")
-    command.add_argument("--at", type=float, nargs="+", metavar="M", help="position of a controller that is not scheduled")
+    command.add_argument(
+        "--at", type=float, nargs="+", metavar="M", help="position of a controller that is not scheduled"
+    )
     command.add_argument("--period", type=float, default=1e-4, help="sampling period [s], default 1e-4")
     command.add_argument("--form", choices=["trapezoidal", "discrete"], default="trapezoidal", help="of one step")
     command.add_argument("--degree", type=int, help="in p, of the form discrete")

@@ -98,9 +98,7 @@ def planned(settings: MotionSettings, box: Array, n_axes: int) -> Path:
         first, last = (default if wanted[n] is None else wanted[n] for n, default in (("start", start), ("end", end)))
         move = point_to_point(first, last, limits, period=period, box=box)
         stop = float(move.knots[-1])
-        return Path(
-            trajectory=move, windows=np.array([[stop, stop + settings.loop["settle"]]]), scanning=False
-        )
+        return Path(trajectory=move, windows=np.array([[stop, stop + settings.loop["settle"]]]), scanning=False)
     axis = len(box) - 1 if wanted["axis"] is None else whole_number("axis", wanted["axis"], 0)
     length = 0.5 * width[min(axis, len(box) - 1)] if wanted["length"] is None else wanted["length"]
     if wanted["start"] is None and axis < len(box):

@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
     measures = measures_of(settings, motion, error, windows)
     arrays = {name: np.asarray(value) for name, value in vars(motion).items() if isinstance(value, np.ndarray)}
     write_arrays(out / "motion.npz", KIND, arrays | {"judged_error": error, "windows": windows})
-    record = {"design": design.name, "architecture": design.architecture, "settings": vars(settings)}
+    record: dict[str, object] = {"design": design.name, "architecture": design.architecture, "settings": vars(settings)}
     record |= {"measures": measures, "cpu_seconds": seconds}
     write_json(out / "motion.json", record)
     lines = report_lines(design, settings, motion, measures)
@@ -70,9 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if motion.stopped is None else 1
 
 
-def move(
-    design: StoredDesign, settings: MotionSettings, progress: Progress
-) -> tuple[Motion, Array, Array, float]:
+def move(design: StoredDesign, settings: MotionSettings, progress: Progress) -> tuple[Motion, Array, Array, float]:
     """The motion, its error where it is judged, the windows that count, and CPU seconds."""
     path = planned(settings, design.box, len(design.f_bw))
     loop = settings.loop

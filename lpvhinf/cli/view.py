@@ -16,11 +16,15 @@ def add(commands: Any) -> None:
         "view", help="write an interactive HTML page of designs", description=__doc__,
         epilog="The page is one file, below 5 MB. Open it in any browser; arrow keys move the position.",
     )  # fmt: skip
-    command.add_argument("results", type=Path, metavar="RESULTS", help="folder of a design, or a study's results folder")
+    command.add_argument(
+        "results", type=Path, metavar="RESULTS", help="folder of a design, or a study's results folder"
+    )
     command.add_argument("--out", type=Path, help="page to write, default RESULTS/view.html")
     command.add_argument("--design", action="append", metavar="NAME", help="show only these designs; may be repeated")
     command.add_argument("--grid", type=int, default=13, help="positions along every axis, default 13")
-    command.add_argument("--certificates", type=Path, help="results folder of the study certify, default beside RESULTS")
+    command.add_argument(
+        "--certificates", type=Path, help="results folder of the study certify, default beside RESULTS"
+    )
     command.set_defaults(run=run, interrupted="nothing was written")
 
 

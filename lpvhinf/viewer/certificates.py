@@ -47,7 +47,9 @@ def of_the_study(design: StoredDesign, study: Path | None) -> list[dict[str, Any
     claims = folder / "claims" / results.name / design.name
     if not claims.is_dir():
         if study is not None and not (study / "claims").is_dir():
-            raise StorageError(f"certificates is {study}, which has no folder claims. Give results of the study certify.")
+            raise StorageError(
+                f"certificates is {study}, which has no folder claims. Give results of the study certify."
+            )
         return []
     found = []
     for path in sorted(claims.glob("*/arrays.npz")):

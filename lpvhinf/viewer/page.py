@@ -122,9 +122,7 @@ def view(
         "machine": next((it for it in map(machine_view, chosen) if it is not None), None),
     }
     size = write_page(Path(out), content)
-    return Page(
-        path=Path(out), designs=tuple(d.name for d in chosen), grid=n, n_positions=len(over.points), size=size
-    )
+    return Page(path=Path(out), designs=tuple(d.name for d in chosen), grid=n, n_positions=len(over.points), size=size)
 
 
 def _chosen(found: list[StoredDesign], names: Sequence[str] | None) -> list[StoredDesign]:
@@ -164,10 +162,8 @@ def _design(design: StoredDesign, found: Responses, deviation: dict[str, Any]) -
     }
 
 
-def _deviation(
-    design: StoredDesign, grid: Grid, hertz: Array, found: Responses, progress: Progress
-) -> dict[str, Any]:
-    """Largest and typical deviation of interpolated curves from recomputed ones [dB], where they are near their peak."""
+def _deviation(design: StoredDesign, grid: Grid, hertz: Array, found: Responses, progress: Progress) -> dict[str, Any]:
+    """Largest and typical deviation of interpolated curves from recomputed ones [dB], near their peak."""
     points = spread_points(design.box, N_CHECKED, seed=3)
     true = responses(design, points, hertz, progress)
     out: dict[str, Any] = {}

@@ -88,12 +88,12 @@ def one(design: StoredDesign, system: tuple[Array, ...], omega: Array, n_rb: int
     right = np.concatenate([1.0 / so, si[:n_u]])
     T = Response(A, B * right, so[:, None] * C[:n_rb], so[:, None] * D[:n_rb] * right).at(omega)
     S = -T[:, :, :n_rb]
-    L = np.linalg.inv(S) - np.eye(n_rb)
+    L = np.asarray(np.linalg.inv(S) - np.eye(n_rb))
     sigma = {
-        "S": largest_sigma(S),
+        "S": largest_sigma(np.asarray(S)),
         "SG": largest_sigma(T[:, :, n_rb : 2 * n_rb]),
         "SGF": largest_sigma(T[:, :, 2 * n_rb :]),
-        "L": largest_sigma(L),
+        "L": largest_sigma(np.asarray(L, dtype=complex)),
         "Lmin": np.linalg.svd(L, compute_uv=False)[:, -1],
     }
     with np.errstate(divide="ignore"):
