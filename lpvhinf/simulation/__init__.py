@@ -1,6 +1,7 @@
 """What set-points, feedforward and disturbances do to plant and loops over time."""
 
 from lpvhinf.simulation.actuators import Actuators as Actuators
+from lpvhinf.simulation.compliant_feedforward import compliance_of as compliance_of
 from lpvhinf.simulation.excitation import ModeExcitation as ModeExcitation
 from lpvhinf.simulation.excitation import WorstExcitation as WorstExcitation
 from lpvhinf.simulation.excitation import mode_excitation as mode_excitation

@@ -14,6 +14,7 @@ from lpvhinf.checks import Array, finite_array, positive, read_only
 from lpvhinf.decoupling import DecoupledPlant
 from lpvhinf.errors import DimensionError, DomainError
 from lpvhinf.simulation.actuators import Actuators
+from lpvhinf.simulation.compliant_feedforward import Compliance, feedforward_inputs
 from lpvhinf.simulation.controller_steps import ControllerSteps
 from lpvhinf.simulation.plant_steps import ModalPlant, plant_steps, whole_delay
 from lpvhinf.simulation.trajectory import Trajectory
@@ -92,7 +93,8 @@ def simulate(
     period: float = 1e-4,
     delay: float = 1.5e-4,
     settle: float = 0.0,
-    feedforward: bool = True,
+    feedforward: bool | str = True,
+    compliance: Compliance | None = None,
     noise: ArrayLike = 0.0,
     quantisation: ArrayLike = 0.0,
     disturbance: ArrayLike | None = None,
@@ -130,7 +132,11 @@ def simulate(
         Delay from reading to input, above 0.
     settle : [s]
         Time at rest after the set-point.
-    feedforward : bool
+    feedforward : bool or str
+        True is "rigid-body", False "none"; "snap" and "compliance" also make up for what the flexible modes give as
+        springs, at the centre of P or along p(t) (`compliance_of`). They act at the rigid inputs.
+    compliance : callable (N, n_p) -> (N, n_rb, n_rb), optional
+        Springs in place of the plant's own at its rigid outputs, for instance those at the point of control.
     noise, quantisation : float or (n_out,) [m, rad]
         Root mean square of white noise, and step, of every decoupled output.
     disturbance : (N, m), optional
@@ -182,11 +188,10 @@ def simulate(
     whole, _ = whole_delay(tau, T)
     r = trajectory.position(times)
     p = np.clip(trajectory.position(np.append(times, times[-1] + T))[:, :n_p], modal.box[:, 0], modal.box[:, 1])
-    ahead = np.zeros((N, n_in))
-    if feedforward:  # the mean acceleration over the sample in which it acts
-        speed = trajectory.velocity(np.append(times, times[-1] + T) + tau)
-        speed[0] = 0.0  # what was missed before the first input arrives is made up for by it
-        ahead[:, :n_rb] = np.diff(speed, axis=0) / T
+    ahead = np.zeros((N, n_in))  # means over the samples in which they act
+    kind = feedforward if isinstance(feedforward, str) else "rigid-body" if feedforward else "none"
+    acting = np.append(times, times[-1] + T) + tau
+    ahead[:, :n_rb] = feedforward_inputs(kind, modal, trajectory, acting, T, compliance)
     sigma, steps = _per_output("noise", noise, n_out), _per_output("quantisation", quantisation, n_out)
     added = np.random.default_rng(seed).normal(0.0, 1.0, (N, n_out)) * sigma if np.any(sigma) else None
     rounded = bool(np.any(steps))
