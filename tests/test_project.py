@@ -48,7 +48,9 @@ FLOORS = {
     "codesign": 5,
     "robustness": 5,
     "simulation": 5,
+    "stored_design": 2,
     "plotting": 6,
+    "viewer": 6,
     "cli": 7,
 }
 ENGINES = ("hinfstruct", "lpv", "certify")  # serve any plant, so they know none
