@@ -9,7 +9,7 @@ import pytest
 
 import lpvhinf
 from lpvhinf.cli.main import main as console
-from lpvhinf.cli.main import read_specification
+from lpvhinf.cli.settings_file import read_settings
 from studies import output_observer
 from studies.__main__ import STUDIES, main
 from studies.settings import PRESETS, load_settings
@@ -160,5 +160,7 @@ def test_a_missing_specification(capsys: pytest.CaptureFixture[str], tmp_path: P
 def test_a_specification_from_a_file(tmp_path: Path) -> None:
     path = tmp_path / "wanted.toml"
     path.write_text("f_bw = [30, 30, 40, 40, 40, 40]\nepsilon = 0.1\n", encoding="utf-8")
-    assert read_specification(path) == lpvhinf.Specification(f_bw=(30, 30, 40, 40, 40, 40), epsilon=0.1)
-    assert read_specification(None) == lpvhinf.Specification()
+    assert lpvhinf.Specification.from_mapping(read_settings(path)) == lpvhinf.Specification(
+        f_bw=(30, 30, 40, 40, 40, 40), epsilon=0.1
+    )
+    assert lpvhinf.Specification.from_mapping(read_settings(None)) == lpvhinf.Specification()
