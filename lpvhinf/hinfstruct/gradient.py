@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
+from scipy.linalg import lapack
 
 from lpvhinf.checks import Array
 from lpvhinf.hinfstruct.loop import ClosedLoop
@@ -55,13 +55,12 @@ def peak_gain(loop: ClosedLoop, omega: float, cluster: float = 0.0, most: int = 
         Singular values down to (1 - cluster) times the largest are kept, `most` of them at most.
     """
     if np.isfinite(omega) and loop.A.shape[0]:
-        factor = scipy.linalg.lu_factor(
-            1j * omega * np.eye(loop.A.shape[0]) - loop.A, overwrite_a=True, check_finite=False
-        )
-        RB = scipy.linalg.lu_solve(factor, loop.B.astype(complex), check_finite=False)
+        # LAPACK at once: the checks of a wrapper cost as much as the factors of a small loop
+        lu, pivots, _ = lapack.zgetrf(1j * omega * np.eye(loop.A.shape[0]) - loop.A, overwrite_a=True)
+        RB = lapack.zgetrs(lu, pivots, loop.B.astype(complex))[0]
         T = loop.C @ RB + loop.D
         U, sigma, V, r = _near_maximal(T, cluster, most)
-        CR = scipy.linalg.lu_solve(factor, (loop.C.T @ U.conj()).astype(complex), trans=1, check_finite=False).T
+        CR = lapack.zgetrs(lu, pivots, (loop.C.T @ U.conj()).astype(complex), trans=1)[0].T
         return PeakGain(omega, sigma[:r], CR @ loop.Bi + U.conj().T @ loop.D12i, loop.Ci @ (RB @ V) + loop.D21i @ V)
     U, sigma, V, r = _near_maximal(loop.D.astype(complex), cluster, most)
     return PeakGain(omega, sigma[:r], U.conj().T @ loop.D12i, loop.D21i @ V)

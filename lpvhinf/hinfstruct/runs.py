@@ -26,8 +26,11 @@ DRAWS = 4
 LARGE = 10.0
 #: Scales of a random draw that are tried.
 SCALES = (1.0, 0.3, 0.1, 0.03, 0.01)
-#: Reasons that leave a polish open; optimality of a minimum; BFGS iterations and relative gain of another attempt.
-LIMITS, MINIMAL, RETRY, RETRY_GAIN = ("iteration limit", "time limit"), 1e-3, 100, 1e-4
+#: Reasons that leave a polish open; optimality of a minimum; relative gain of another attempt by BFGS.
+LIMITS, MINIMAL, RETRY_GAIN = ("iteration limit", "time limit"), 1e-3, 1e-4
+#: BFGS iterations of another attempt, and the window in which it must gain; where an iteration costs far less than one
+#: of the bundle, long attempts follow the curved valleys that lead to large gains.
+RETRY, LONG_RETRY = (100, 15), (1000, 60)
 #: Guard mu against infinite gains, in the first descent of every other random start.
 GUARD = 0.02
 #: Tolerance of a descent that was to be left out, from a start that does not stabilise.
@@ -46,8 +49,9 @@ class Task:
     """Everything a worker needs; `theta` None means a random start.
 
     A descent begins at `theta`, moved at random by `kick` unit steps of the metric; a polish has the trust region of
-    `radius` at first (None: the usual one), takes at most `iterations`, and with `anew` begins by BFGS and the usual
-    trust region.
+    `radius` at first (None: the usual one), takes at most `iterations`, and with `anew` begins by BFGS (at most
+    `retry` iterations, ended by a window of the other length; again from points moved by `shakes` unit steps, which
+    `turn` draws) and the usual trust region.
     """
 
     plants: tuple[GeneralizedPlant, ...]
@@ -64,6 +68,9 @@ class Task:
     iterations: int = 150
     radius: float | None = None
     anew: bool = False
+    retry: tuple[int, int] = RETRY
+    shakes: tuple[float, ...] = ()
+    turn: int = 0
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -211,27 +218,26 @@ def polish(task: Task, listen: Listener | None = None) -> Outcome:
     first = NormOracle(loops, budget)
     gamma = first.gamma(first.evaluate(task.theta))
     theta, radius, left, anew = task.theta, task.radius, task.iterations, task.anew
+    rng = np.random.default_rng([task.seed, task.start, task.turn])
+    history = []
     while True:
-        oracle = NormOracle(loops, budget, offset=gamma)
-        heard = _heard(oracle, listen, "polish")
+        before = gamma
         if anew:
-            begin = oracle.confirm(oracle.evaluate(theta))
-            again = bfgs(oracle, begin, budget, max_iterations=RETRY, tolerance=RETRY_GAIN, window=15, accepted=heard)
-            theta, radius, gamma = again.point.theta, None, oracle.gamma(again.point)
-            oracle = NormOracle(loops, budget, offset=gamma)
-            heard = _heard(oracle, listen, "polish")
-        start = oracle.confirm(oracle.evaluate(theta))
+            theta, gamma, record = _again(task, loops, theta, gamma, rng, listen)
+            history.append(record)
+            radius = None
+        oracle = NormOracle(loops, budget, offset=gamma)
         run = bundle(
             oracle,
-            start,
+            oracle.confirm(oracle.evaluate(theta)),
             budget,
             max_iterations=left,
             tolerance=task.tolerance,
             radius=radius,
             thorough=len(task.plants) == 1,
-            accepted=heard,
+            accepted=_heard(oracle, listen, "polish"),
         )
-        gained = gamma - oracle.gamma(run.point)
+        gained = before - oracle.gamma(run.point)
         left -= run.iterations
         limited = run.reason in LIMITS
         stalled = radius is None and gained <= RETRY_GAIN * gamma
@@ -246,7 +252,34 @@ def polish(task: Task, listen: Listener | None = None) -> Outcome:
         abscissa=-np.inf,
         optimality=run.optimality * (gamma + oracle.offset) / max(gamma, SMALLEST),
         reason=run.reason,
-        history=(_record(task, "polish", budget, gamma, run.reason),),
+        history=(*history, _record(task, "polish", budget, gamma, run.reason)),
         finished=not limited,
         radius=radius,
     )
+
+
+def _again(
+    task: Task, loops: ClosedLoops, theta: Array, gamma: float, rng: np.random.Generator, listen: Listener | None
+) -> tuple[Array, float, PhaseRecord]:
+    """BFGS from theta, then from the best point moved at random: at a kink itself it finds no descent."""
+    budget = _budget(task)
+    most, window = task.retry
+    reason = "no descent"
+    for kick in (0.0, *task.shakes):
+        oracle = NormOracle(loops, budget, offset=gamma)
+        start = oracle.evaluate(theta if kick == 0.0 else _kicked(loops, theta, kick, rng))
+        if not np.isfinite(start.value) or budget.spent:
+            continue
+        run = bfgs(
+            oracle,
+            oracle.confirm(start),
+            budget,
+            max_iterations=most,
+            tolerance=RETRY_GAIN,
+            window=window,
+            accepted=_heard(oracle, listen, "polish"),
+        )
+        found = oracle.gamma(run.point)
+        if found < gamma or kick == 0.0:
+            theta, gamma, reason = run.point.theta, found, run.reason
+    return theta, gamma, _record(task, "descend", budget, gamma, reason)

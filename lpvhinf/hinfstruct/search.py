@@ -11,11 +11,12 @@ from lpvhinf.checks import Array
 from lpvhinf.hinfstruct.oracle import SMALLEST
 from lpvhinf.hinfstruct.result import PhaseRecord
 from lpvhinf.hinfstruct.runner import Runner
-from lpvhinf.hinfstruct.runs import Outcome, Task, descend, polish
+from lpvhinf.hinfstruct.runs import LONG_RETRY, MINIMAL, Outcome, Task, descend, polish
 
 #: Starts whose norm is above this multiple of the best one are not polished.
 HOPELESS = 1.5
-#: Starts of a batch, for loops that are cheap to evaluate and for others.
+#: Loops that are cheap to evaluate, in evaluations of a small loop; starts of a batch for them and for others.
+CHEAP = 4.0
 BATCH, SMALL_BATCH = 8, 2
 #: Rounds of the polish: iterations, and the part of a batch that takes part.
 ROUNDS = ((25, 0.5), (50, 0.25))
@@ -28,8 +29,8 @@ POLISH_COST, POLISH_COST_EACH = 10.0, 0.8
 #: With limited effort the best start is polished on by so many iterations as long as they gain this part of the norm,
 #: up to this multiple of the effort.
 CHUNK, GAIN, LONGEST = 50, 1e-3, 3.0
-#: Chunks without such a gain, all but the first begun anew, after which other starts have their turn.
-STALLS = 2
+#: Iterations of the bundle after BFGS where that is cheap; the gain that a way not yet tried is taken to have.
+SHORT, LARGE_GAIN = 15, 0.05
 #: Ends within this of each other are the same minimum; so many starts must agree on the best one.
 SAME, AGREE = 1e-4, 4
 #: Parameters closer than this, relatively, are on the way to the same minimum.
@@ -38,8 +39,8 @@ NEAR = 0.1
 LEAST_BATCHES = 2
 #: A polish that ends this much higher, relatively, has not lost: tracked and exact peaks differ by as much.
 ROUND_OFF = 1e-7
-#: Sizes of the perturbations of the best point, in unit steps of the metric.
-KICKS = (1.0, 4.0)
+#: Sizes of the perturbations of the best point, in unit steps of the metric, and of those before a cheap polish.
+KICKS, SHAKES = (1.0, 4.0), (0.1, 0.3)
 
 
 @dataclass(slots=True, eq=False)
@@ -108,18 +109,27 @@ def search(
         Of the polish of one start.
     """
     pool = Pool(polish_cost=POLISH_COST + POLISH_COST_EACH * parameters)
-    size = BATCH if cost < 4.0 else SMALL_BATCH
+    size = BATCH if cost < CHEAP else SMALL_BATCH
     tasks = [make(k, theta) for k, theta in enumerate(given)]
     tasks += [make(len(given) + k, None) for k in range(size if starts is None else starts)]
     adaptive = starts is None
+
+    def attempt(start: int, theta: Array | None) -> Task:
+        # iterations of BFGS that cost next to nothing come before every part of the polish
+        task = make(start, theta)
+        if cost >= CHEAP:
+            return task
+        return replace(task, anew=True, retry=LONG_RETRY, shakes=SHAKES, turn=len(pool.history))
+
     least = LEAST_BATCHES if parameters > 1 else 1
     batches = 0
     while True:
         batches += 1
         pool.add(runner.map(descend, tasks, share=0.4 if not adaptive or not pool.latest else 0.2))
         if pool.ranked():
-            spent = _polish(runner, pool, make, [t.start for t in tasks], max_iterations)
-            _finish(runner, pool, make, spent, max_iterations, LONGEST * EFFORT / cost if adaptive else np.inf)
+            spent = _polish(runner, pool, attempt, [t.start for t in tasks], max_iterations)
+            effort = LONGEST * EFFORT / cost if adaptive else np.inf
+            _finish(runner, pool, attempt, spent, max_iterations, effort, cost < CHEAP and adaptive)
         if runner.over or not adaptive:
             return pool
         if pool.work * cost >= EFFORT or (batches >= least and pool.ranked() and pool.agreeing() >= AGREE):
@@ -132,7 +142,7 @@ def _polish(
 ) -> dict[int, int]:
     """Rounds of successive halving over a batch; the iterations that each start has had."""
     spent = dict.fromkeys(pool.latest, 0)
-    for iterations, part in ROUNDS:
+    for k, (iterations, part) in enumerate(ROUNDS):
         ranked = [o for o in pool.ranked() if o.start in batch]
         level = max(HOPELESS * pool.ranked()[0].gamma, SMALLEST)
         chosen = [o for o in _distinct(ranked) if o.gamma <= level and not o.finished]
@@ -140,7 +150,7 @@ def _polish(
         chosen = [o for o in chosen if spent[o.start] < max_iterations]
         counts = [min(iterations, max_iterations - spent[o.start]) for o in chosen]
         tasks = [
-            replace(make(o.start, o.theta), iterations=count, radius=o.radius)
+            replace(task := make(o.start, o.theta), iterations=count, radius=o.radius, anew=task.anew and k > 0)
             for o, count in zip(chosen, counts, strict=True)
         ]
         pool.add(runner.map(polish, tasks, share=0.4))
@@ -156,23 +166,43 @@ def _finish(
     spent: dict[int, int],
     max_iterations: int,
     effort: float,
+    cheap: bool,
 ) -> None:
-    """Polish the best start to its end: as long as it gains, where the effort is limited."""
-    stalls = 0
-    while not runner.over:
-        best = pool.ranked()[0]
-        left = max_iterations - spent.get(best.start, 0)
-        if best.finished or left <= 0 or pool.work >= effort:
+    """Polish the best start to its end: as long as it gains, where the effort is limited.
+
+    With cheap loops the next best start has its turn then, unless the best one is at a minimum.
+    """
+    rates: dict[int, list[float]] = {}
+    while not runner.over and pool.work < effort:
+        ranked = pool.ranked()
+        if ranked[0].finished and (not cheap or ranked[0].optimality <= MINIMAL):
             return
-        count = min(left, CHUNK) if np.isfinite(effort) else left
-        before = best.gamma
-        task = replace(make(best.start, best.theta), iterations=count, radius=best.radius)
-        pool.add(runner.map(polish, [replace(task, anew=stalls > 0)], share=1.0))
+        # a polish that ended off a minimum is open: moved at random, BFGS may leave its kink
+        open_ones = [
+            o
+            for o in _distinct(ranked)
+            if not (o.finished and o.optimality <= MINIMAL) and max(_rates(rates, o)) > GAIN
+        ]
+        best = next(iter(open_ones), ranked[0]) if cheap else ranked[0]
+        left = max_iterations - spent.get(best.start, 0)
+        known = _rates(rates, best)
+        if left <= 0 or max(known) <= GAIN or best.gamma > HOPELESS * ranked[0].gamma:
+            return
+        # on from the trust region, or anew by BFGS: what has gained more for its cost
+        anew = known[1] > known[0]
+        count = min(left, SHORT if anew and cheap else CHUNK) if np.isfinite(effort) else left
+        task = replace(make(best.start, best.theta), iterations=count, radius=best.radius, anew=anew)
+        before, work = best.gamma, pool.work
+        pool.add(runner.map(polish, [task], share=1.0))
         spent[best.start] = spent.get(best.start, 0) + count
         if np.isfinite(effort):
-            stalls = stalls + 1 if pool.ranked()[0].gamma > (1.0 - GAIN) * before else 0
-            if stalls >= STALLS:
-                return
+            gained = 1.0 - pool.latest[best.start].gamma / max(before, SMALLEST)
+            known[int(anew)] = gained * CHUNK * pool.polish_cost / max(pool.work - work, 1.0)
+
+
+def _rates(rates: dict[int, list[float]], outcome: Outcome) -> list[float]:
+    """Relative gain of a start by the work of a chunk: on from the trust region, and anew; at first both are open."""
+    return rates.setdefault(outcome.start, [np.inf, LARGE_GAIN])
 
 
 def _distinct(ranked: list[Outcome]) -> list[Outcome]:
